@@ -13,6 +13,7 @@ from .design_tables import history as history
 from .design_tables import vertices as vertices
 from .fact_records import ABSENT as ABSENT
 from .fact_records import Fact as Fact
+from .fact_records import facts_of as facts_of
 from .fact_records import grouped as grouped
 from .fact_records import number as number
 from .fact_records import percent as percent

@@ -2,14 +2,14 @@
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from difflib import get_close_matches
 from pathlib import Path
 
 from pipeline.problem.sections import Paper
 from pipeline.runtime import UserError
-from reports.base import Table
+from reports.base import Table, prose
 
 ABSENT = "—"
 
@@ -49,6 +49,30 @@ def number(
 def share(key: str, label: str, value: float, paper: str = ABSENT, note: str = "") -> Fact:
     """Returns fact of a share given as a fraction of one, shown in per cent to a tenth."""
     return Fact(key, label, 100.0 * value, "%", percent(value), paper, note)
+
+
+def facts_of(module: str) -> Callable[..., Fact]:
+    """Returns what makes the facts told of in the YAML beside a module, given its `__file__`.
+
+    By key, that has the label, and where they are not empty note, unit and the paper's words, with
+    the digits of the value in words (4). The unit "share" is of a fraction of one. Names in braces
+    are filled in; note, unit and paper may be given instead.
+    """
+    rows = prose(module)
+
+    def made(key: str, value: float, ours: str = "", /, **words: object) -> Fact:
+        row = {"unit": "1", "note": "", "paper": ABSENT, **rows[key]}
+        label, unit, note, paper = (
+            str(words[name]) if name in words else row[name].format_map(words)
+            for name in ("label", "unit", "note", "paper")
+        )
+        key = key.format_map(words)
+        if unit == "share":
+            return share(key, label, value, paper, note)
+        ours = ours or worded(value, unit, row.get("digits", 4))
+        return Fact(key, label, value, unit, ours, paper, note)
+
+    return made
 
 
 def quoted(facts: Sequence[Fact], paper: Paper | None) -> list[Fact]:

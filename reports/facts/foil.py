@@ -8,11 +8,13 @@ import xarray as xr
 
 from pipeline.posing import altered_lattice_of, flat_vertices, lattice_of, material_of
 from pipeline.problem import Problem
-from reports.facts.fact_records import Fact, percent, share
+from reports.facts.fact_records import Fact, facts_of, percent
 from reports.study import display_name
 from sim.core import Floats
 from sim.scene import foil_strains
 from sim.structure import parameters, shape
+
+_told = facts_of(__file__)
 
 
 def strain_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
@@ -20,13 +22,16 @@ def strain_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
     limit = strain_limit(problem)
     for name, strains in largest_strains(problem, response).items():
         case, bend = int(strains.argmax()), response["max_bend"].sel(structure=name)
-        note = (
-            f"at a face of a foil of {problem.shim_thickness:g} mm, bent by the turn of its ends"
-            f" (of {np.degrees(float(bend.max())):.3g}° at most) and by shear, and stretched;"
-            f" limit {percent(limit)}: " + ("kept" if strains[case] <= limit else "exceeded")
+        yield _told(
+            "shim_strain_{name}",
+            float(strains[case]),
+            name=name,
+            words=display_name(problem, name).lower(),
+            foil=problem.shim_thickness,
+            bend=np.degrees(float(bend.max())),
+            limit=percent(limit),
+            kept="kept" if strains[case] <= limit else "exceeded",
         )
-        label = f"Largest shim strain, {display_name(problem, name).lower()}"
-        yield share(f"shim_strain_{name}", label, float(strains[case]), note=note)
 
 
 def strain_warning(problem: Problem, response: xr.Dataset) -> Iterator[str]:

@@ -6,11 +6,12 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem import Problem
-from reports.facts.fact_records import Fact, percent, worded
+from reports.facts.fact_records import Fact, facts_of, percent, worded
 from reports.study import display_name
 from sim.core import Floats
 
 _ENDS = (0.025, 0.975)
+_told = facts_of(__file__)
 
 
 def constants_facts(
@@ -29,23 +30,19 @@ def constants_facts(
     sound = (made["status"] == "ok").values
     altered, cloaked = (made[name].values[sound] for name in ("loss_altered", "loss"))
     if not len(cloaked):
-        words = str(made["status"].values[0])
-        yield Fact("constants_loss_end", "Loss, cloaked", np.nan, unit, "none", note=words)
+        why = str(made["status"].values[0])
+        yield _told("constants_loss_end", np.nan, "none", unit=unit, note=why)
         return
     failed = f", {(~sound).sum()} of them failed" if not sound.all() else ""
-    for key, label, values, own in (
-        ("start", f"Loss, {display_name(asked, 'altered').lower()}", altered, nominal[0]),
-        ("end", "Loss, cloaked", cloaked, nominal[1]),
-    ):
-        told = _quantity(values, unit)
-        note = f"nominal {worded(own, unit, 3)}; mean and 95 % of {len(sound)} draws{failed}"
-        yield Fact(f"constants_loss_{key}", label, float(values.mean()), unit, told, note=note)
+    for key, values, own in (("start", altered, nominal[0]), ("end", cloaked, nominal[1])):
+        words = {"unit": unit, "own": worded(own, unit, 3), "count": len(sound), "failed": failed}
+        words["shown"] = display_name(asked, "altered").lower()
+        mean = float(values.mean())
+        yield _told(f"constants_loss_{key}", mean, _quantity(values, unit), **words)
     gain = 1 - cloaked / altered
     low, high = (percent(float(end)) for end in np.quantile(gain, _ENDS))
-    own = 1 - nominal[1] / nominal[0]
-    words, mean = f"{percent(float(gain.mean()))} ({low} to {high})", 100 * float(gain.mean())
-    note = f"nominal {percent(own)}; of each draw's own structure without a cloak"
-    yield Fact("constants_reduction", "Loss reduced by", mean, "%", words, note=note)
+    ours, mean = f"{percent(float(gain.mean()))} ({low} to {high})", 100 * float(gain.mean())
+    yield _told("constants_reduction", mean, ours, own=percent(1 - nominal[1] / nominal[0]))
 
 
 def _quantity(values: Floats, unit: str) -> str:

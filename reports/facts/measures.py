@@ -15,8 +15,7 @@ def magnitude(displacement: xr.DataArray, scale: Floats) -> xr.DataArray:
     """Finds |U| of the dimensionless displacement U = (ux/s, uy/s, theta), any dims but dof."""
     divisors = xr.DataArray(scale, dims="dof", coords={"dof": displacement["dof"]})
     squares: xr.DataArray = (displacement / divisors) ** 2
-    size: xr.DataArray = squares.sum("dof") ** 0.5
-    return size
+    return squares.sum("dof") ** 0.5
 
 
 def mean_magnitude(response: xr.Dataset, scene: ReportScene, until: float) -> xr.DataArray:
@@ -47,8 +46,7 @@ def case_direction(response: xr.Dataset, direction: float) -> float:
 def peak_to_peak(series: xr.DataArray, until: float) -> xr.DataArray:
     """Returns peak-to-peak value over the time [0, until]."""
     window = series.sel(time=slice(None, until * LAST_SAMPLE))
-    span: xr.DataArray = window.max("time") - window.min("time")
-    return span
+    return window.max("time") - window.min("time")
 
 
 def asymmetry(structure: RigidUnits, middle: tuple[float, float]) -> Floats:

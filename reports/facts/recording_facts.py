@@ -1,13 +1,15 @@
 """Describes the numbers of recordings beside their simulation, the same for every study."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
-from reports.facts.fact_records import Fact, grouped, number, share, worded
+from reports.facts.fact_records import Fact, facts_of, grouped, worded
 from reports.study import RecordedMotion
 from sim.core import Floats
 
+_told = facts_of(__file__)
 DOFS = {"ux": "u_x", "uy": "u_y", "theta": "θ"}
 
 
@@ -29,59 +31,41 @@ def intervals(measured: Floats, predicted: Floats, unit: str = "") -> str:
 
 
 def _facts(recording: RecordedMotion) -> Iterator[Fact]:
-    data, name = recording.data, recording.name
-    used = int((data["use"] == 0).sum())
-    note = f"{len(recording.along)} frames, {used} units; {data.attrs['alignment']}"
-    yield number(f"{name}_frames", "Frames compared", len(recording.along), note=note)
+    data, told = recording.data, partial(_told, name=recording.name)
+    frames, used = len(recording.along), int((data["use"] == 0).sum())
+    yield told("{name}_frames", frames, frames=frames, used=used, how=data.attrs["alignment"])
     for dof, symbol in DOFS.items():
-        unit = "rad" if dof == "theta" else "mm"
         off = {side: data["rmse"].sel(side=side, dof=dof) for side in ("simulated", "nominal")}
         value, low, high = (float(each) for each in off["simulated"].values)
-        note = (
-            f"95 %: {low:.3g} to {high:.3g}; against the problem as stated "
-            f"{float(off['nominal'].sel(estimate='value')):.3g} {unit}"
-        )
-        yield number(f"{name}_rmse_{dof}", f"RMS residual of {symbol}", value, unit, note=note)
-    for key, label in (
-        ("nrmse", "RMS residual over RMS motion"),
-        ("noise_share", "Share of the residual that is noise of the measurement"),
-    ):
+        stated = float(off["nominal"].sel(estimate="value"))
+        words = {"symbol": symbol, "low": low, "high": high, "stated": stated}
+        unit = "rad" if dof == "theta" else "mm"
+        yield told("{name}_rmse_{dof}", value, dof=dof, of=unit, **words)
+    for key in ("nrmse", "noise_share"):
         values = data[key].sel(side="simulated", estimate="value").values
-        note = "; ".join(
-            f"{symbol} {100 * v:.3g} %" for symbol, v in zip(DOFS.values(), values, strict=True)
-        )
-        yield share(f"{name}_{key}", f"{label}, mean", float(np.nanmean(values)), note=note)
+        pairs = zip(DOFS.values(), values, strict=True)
+        note = "; ".join(f"{symbol} {100 * v:.3g} %" for symbol, v in pairs)
+        yield told(f"{{name}}_{key}", float(np.nanmean(values)), note=note)
     values = data["correlation"].sel(side="simulated", estimate="value").values
-    note = "of measured and simulated motion; the least of u_x, u_y and θ"
-    yield number(f"{name}_correlation", "Correlation", float(np.nanmin(values)), note=note)
+    yield told("{name}_correlation", float(np.nanmin(values)))
     yield from _alignment(recording)
 
 
 def _alignment(recording: RecordedMotion) -> Iterator[Fact]:
-    data, name = recording.data, recording.name
+    data, told = recording.data, partial(_told, name=recording.name)
     lag = data["phase_lag"].sel(side="simulated", dof="uy", estimate="value")
     if np.isfinite(lag):
-        yield number(f"{name}_phase", "Phase lag of u_y", float(np.degrees(lag)), "deg", digits=2)
+        yield told("{name}_phase", float(np.degrees(lag)))
     gain = float(data["drive_gain"])
     if np.isfinite(gain):
-        note = "amplitude of the measured drive over that of the problem; not taken out"
-        yield number(f"{name}_gain", "Gain of the drive", gain, note=note)
+        yield told("{name}_gain", gain)
     scale, sigma = float(data["registration_scale"]), float(data["registration_scale_sigma"])
-    note = f"± {sigma:.1g}, of the specimen against its design; not taken out"
-    yield number(f"{name}_scale", "Scale", scale, digits=5, note=note)
-    if int(data["band_samples"]):
-        values = data["band_coverage"].values
+    yield told("{name}_scale", scale, sigma=sigma)
+    if samples := int(data["band_samples"]):
         usual = 100 * float(np.nanmean(data["band_coverage_usual"].values))
-        note = (
-            f"mean of u_x, u_y and θ; band of {int(data['band_samples'])} simulations, of which"
-            f" 95 % have {usual:.3g} % or more of their own motion within"
-        )
-        label = "Measurements within the band"
-        yield share(f"{name}_coverage", label, float(np.nanmean(values)), note=note)
+        covered = float(np.nanmean(data["band_coverage"].values))
+        yield told("{name}_coverage", covered, samples=samples, usual=usual)
     force = float(data["force_rmse"].sel(side="simulated", estimate="value"))
     if np.isfinite(force):
-        share_of = worded(
-            100 * float(data["force_nrmse"].sel(side="simulated", estimate="value")), "%", 3
-        )
-        note = f"against the load cell; {share_of} of its root mean square"
-        yield number(f"{name}_force", "RMS residual of the force", force, "N", digits=3, note=note)
+        part = 100 * float(data["force_nrmse"].sel(side="simulated", estimate="value"))
+        yield told("{name}_force", force, part=worded(part, "%", 3))

@@ -15,21 +15,14 @@ from reports.study import StudyResults
 
 @dataclass(frozen=True)
 class ReportKind:
-    """Holds the parts of a report, each made from a study.
+    """Holds the parts of a report, each made from a study."""
 
-    Attributes:
-        name: in figures.yaml.
-        facts: numbers computed from the datasets.
-        figure: its panels with captions and tables.
-        text: what the page says of itself, by the caption of the figure and the facts.
-        animation: what the page's player and movies show.
-    """
-
-    name: str
-    facts: Callable[[StudyResults], list[Fact]]
-    figure: Callable[[StudyResults], PanelFigure]
+    name: str  # in figures.yaml
+    facts: Callable[[StudyResults], list[Fact]]  # numbers computed from the datasets
+    figure: Callable[[StudyResults], PanelFigure]  # its panels with captions and tables
+    # what the page says of itself, by the caption of the figure and the facts
     text: Callable[[StudyResults, str, Sequence[Fact]], PageText]
-    animation: Callable[[StudyResults], Animation]
+    animation: Callable[[StudyResults], Animation]  # what the page's player and movies show
 
 
 def _wave_text(study: StudyResults, caption: str, facts: Sequence[Fact]) -> PageText:

@@ -22,22 +22,16 @@ from reports.page import templating
 
 @dataclass(frozen=True)
 class Report:
-    """Holds figures, tables and facts, and the page that shows them.
+    """Holds figures, tables and facts, and the page that shows them."""
 
-    Attributes:
-        figures: functions that draw in the style of all, by the names of their files.
-        template: of the page; none makes no page. It gets `values`, `tables`, of every figure its
-            SVG (`svgs`) and the names of its files (`drawn`), and of the first one `svg`, `files`.
-        values: what else the template shows, by name.
-        tables: written as CSV.
-        facts: written as JSON.
-    """
-
+    # functions that draw in the style of all, by the names of their files
     figures: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)
+    # of the page; none makes no page. It gets `values`, `tables`, of every figure its SVG (`svgs`)
+    # and the names of its files (`drawn`), and of the first one `svg`, `files`.
     template: str = ""
-    values: Mapping[str, Any] = field(default_factory=dict)
-    tables: Sequence[Table] = ()
-    facts: Sequence[Fact] = ()
+    values: Mapping[str, Any] = field(default_factory=dict)  # what else the template shows, by name
+    tables: Sequence[Table] = ()  # written as CSV
+    facts: Sequence[Fact] = ()  # written as JSON
 
 
 def publish(report: Report, folder: Path) -> list[Path]:

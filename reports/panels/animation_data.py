@@ -114,25 +114,15 @@ def kept_frames(n_frames: int, n_values: int) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class Animation:
-    """Tells what plays: structures side by side under their load cases, along one axis.
+    """Tells what plays: structures side by side under their load cases, along one axis."""
 
-    Attributes:
-        axis: what the slider runs over.
-        cases: labels of the load cases.
-        clips: the structures with their motions.
-        fields: what may colour them, the default first.
-        discs: circles on all of them.
-        start: the case shown first.
-        pad: side of the squares under clamped units, mm.
-    """
-
-    axis: AnimationAxis
-    cases: Sequence[str]
-    clips: Sequence[AnimationClip]
-    fields: Sequence[ColourField]
-    discs: Sequence[DashedDisc] = ()
-    start: int = 0
-    pad: float = 0.0
+    axis: AnimationAxis  # what the slider runs over
+    cases: Sequence[str]  # labels of the load cases
+    clips: Sequence[AnimationClip]  # the structures with their motions
+    fields: Sequence[ColourField]  # what may colour them, the default first
+    discs: Sequence[DashedDisc] = ()  # circles on all of them
+    start: int = 0  # the case shown first
+    pad: float = 0.0  # side of the squares under clamped units, mm
 
 
 def payload(reel: Animation) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from reports.base import style
+from reports.base import prose, style
 from reports.panels.animation_data import AnimationClip
 from reports.study import LABEL, RecordedMotion, from_dataset
 from sim.core import Floats
@@ -19,6 +19,7 @@ from sim.core import Floats
 MARKERS = 22
 """Of a measured curve."""
 _DASHES = (0, (2.6, 1.4))
+_PROSE = prose(__file__)
 
 
 def measured_curve(axes: Axes, along: Floats, values: Floats, colour: str) -> None:
@@ -92,14 +93,5 @@ def caption(recordings: Sequence[RecordedMotion]) -> str:
     """Tells what a figure with recordings says of them, as HTML; nothing without."""
     if not recordings:
         return ""
-    text = (
-        " Experiment stands above simulation; its curves are dashed with markers, those of the "
-        "simulation continuous; the bands hold 95 % of simulations of imperfect specimens under "
-        "the measured motion of drive and supports. Units that were not found are white."
-    )
-    if any(each.synthetic for each in recordings):
-        text += (
-            f" <b>{LABEL}</b>: these recordings were rendered from simulated imperfect specimens "
-            "and tracked as videos are; no specimen was filmed."
-        )
-    return text
+    told = ["experiment", *["synthetic"] * any(each.synthetic for each in recordings)]
+    return "".join(f" {_PROSE[name].format(label=LABEL)}" for name in told)

@@ -12,19 +12,14 @@ from reports.study import draft
 
 @dataclass(frozen=True)
 class Panel:
-    """Describes a part of a figure.
+    """Describes a part of a figure."""
 
-    Attributes:
-        head: its letter and title, and where they stand: mm from the page's left and top.
-        draw: draws the panel below its letter; none if another one draws it too.
-        caption: its sentence, as HTML.
-        tables: what it shows.
-    """
-
+    # its letter and title, and where they stand: mm from the page's left and top
     head: tuple[str, str, float, float]
+    # draws the panel below its letter; none if another one draws it too
     draw: Callable[[Figure], object] | None = None
-    caption: str = ""
-    tables: Sequence[Table] = ()
+    caption: str = ""  # its sentence, as HTML
+    tables: Sequence[Table] = ()  # what it shows
 
 
 @dataclass(frozen=True)

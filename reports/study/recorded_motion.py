@@ -20,20 +20,14 @@ _BEYOND = 0.02
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """Describes one recording.
+    """Describes one recording."""
 
-    Attributes:
-        name: of its file.
-        data: the dataset `comparison`.
-        along: (n_frames,) time in s, or displacement of the driven units along the drive in mm,
-            never falling.
-        frames: (n_frames,) the frames that these are, of those in the dataset.
-    """
-
-    name: str
-    data: xr.Dataset
+    name: str  # of its file
+    data: xr.Dataset  # the dataset `comparison`
+    # (n_frames,) time in s, or displacement of the driven units along the drive in mm, never
+    # falling
     along: Floats
-    frames: NDArray[np.int64]
+    frames: NDArray[np.int64]  # (n_frames,) the frames that these are, of those in the dataset
 
     @property
     def structure(self) -> str:
@@ -57,8 +51,7 @@ class RecordedMotion:
 
     def values(self, variable: xr.DataArray) -> Floats:
         """Returns a variable (time, ...) of the dataset at its frames (n_frames, ...)."""
-        found: Floats = variable.transpose("time", ...).values[self.frames]
-        return found
+        return variable.transpose("time", ...).values[self.frames]
 
     def at(self, variable: xr.DataArray, wanted: Floats) -> Floats:
         """Interpolates a variable (time, ...) of the dataset; NaN where nothing was recorded.

@@ -46,8 +46,7 @@ class ReportScene:
     def mean(self, values: xr.DataArray) -> xr.DataArray:
         """Returns weighted mean over the load cases of values (..., case)."""
         weights = xr.DataArray(np.array(self.weights), dims="case")
-        mean: xr.DataArray = (values * weights).sum("case") / float(np.sum(self.weights))
-        return mean
+        return (values * weights).sum("case") / float(np.sum(self.weights))
 
 
 def scene_of_problem(problem: Problem) -> ReportScene:

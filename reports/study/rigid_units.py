@@ -73,8 +73,7 @@ def polygon_centroids(vertices: Floats) -> Floats:
     following = np.roll(local, -1, axis=1)
     cross = local[..., 0] * following[..., 1] - local[..., 1] * following[..., 0]
     moment = ((local + following) * cross[..., None]).sum(axis=1)
-    centroid: Floats = ring[:, 0] + moment / (3.0 * cross.sum(axis=1))[:, None]
-    return centroid
+    return ring[:, 0] + moment / (3.0 * cross.sum(axis=1))[:, None]
 
 
 def deformed(structure: RigidUnits, displacement: Floats | None = None) -> Floats:
@@ -92,8 +91,7 @@ def deformed(structure: RigidUnits, displacement: Floats | None = None) -> Float
         [cosine * arm[..., 0] - sine * arm[..., 1], sine * arm[..., 0] + cosine * arm[..., 1]],
         axis=-1,
     )
-    moved: Floats = (centroid + displacement[:, :2])[:, None] + turned
-    return moved
+    return (centroid + displacement[:, :2])[:, None] + turned
 
 
 def unit_at(structure: RigidUnits, point: Floats) -> int:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from reports.base import style
+from reports.base import prose, style
 from reports.facts import measures
 from reports.figures.framework import domain_panels, model_panel
 from reports.figures.shielding import MONITORED, monitored, monitored_recordings
@@ -22,6 +22,7 @@ SECOND, THIRD = 61.0, 109.0
 """Tops of rows b and c, mm."""
 SMALL, LOOP = 34.0, 112.0
 """Side of a picture in rows b and c, and where the loop of row a begins, mm."""
+_PROSE = prose(__file__)
 
 
 def framework_figure(study: StudyResults) -> PanelFigure:
@@ -33,11 +34,7 @@ def framework_figure(study: StudyResults) -> PanelFigure:
         Panel(
             ("a", "Mimicking problem", 0.0, 0.8),
             lambda figure: _problem(figure, study, initial),
-            "A reference lattice and an altered one, in which a cloak (purple) is to undo the "
-            "alteration in the region of interest (blue): a loss measures how far the two "
-            "responses are apart there, and falls as the cloak’s geometry follows the gradient "
-            "that a differentiable simulation of the full nonlinear dynamics gives. The curves "
-            "are those of the study itself.",
+            _PROSE["a"],
         ),
         Panel(
             ("", "Gradient-based optimisation", LOOP - 4.2, 0.8),
@@ -48,20 +45,17 @@ def framework_figure(study: StudyResults) -> PanelFigure:
             lambda figure: model_panel.ligament_panel(
                 style.place(figure, 0.0, SECOND + 6.0, 58.0, SMALL + 2.0), cloaked, _lying(cloaked)
             ),
-            "Two units of its lattice: three degrees of freedom each, a ligament that stretches, "
-            "shears and bends, and contact as a void closes.",
+            _PROSE["b"],
         ),
         Panel(
             ("c", "Shield excitations, conceal inclusions", 64.0, SECOND),
             lambda figure: _kinds(figure, study, initial),
-            "Cloaks shield their surroundings from an excitation, or conceal what was cut out.",
+            _PROSE["c"],
         ),
         Panel(
             ("d", "From the design to the experiment", 0.0, THIRD),
             lambda figure: _making(figure, study, cloaked),
-            "The optimised cloak, what is cut of it, its units as a camera finds them (cyan "
-            "outlines; orange: how far they moved), and the motion of the middle unit of the top "
-            "edge, without the cloak (orange) and with it (purple).",
+            _PROSE["d"],
         ),
     ]
     return PanelFigure(HEIGHT, panels, remark=measured_overlay.caption(study.recordings))

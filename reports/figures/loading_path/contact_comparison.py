@@ -6,11 +6,13 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem import Problem
-from reports.facts import Fact, number, percent, share, stability_facts, worded
+from reports.facts import Fact, facts_of, percent, stability_facts, worded
 from reports.figures.loading_path import measures
 from reports.figures.loading_path.abscissa import structures
 from reports.figures.loading_path.curves import over_cases
 from reports.study import RedesignResults, StudyResults, display_name
+
+_told = facts_of(__file__)
 
 
 def contact_facts(study: StudyResults) -> Iterator[Fact]:
@@ -36,11 +38,11 @@ def _by_law(
         for law in (str(law) for law in response["contact_law"].values):
             part = response.sel(structure=name, contact_law=law)
             loss = float(losses.sel(structure=name, contact_law=law))
-            key = f"contact_{law}_{whose or name}"
             words = display_name(problem, name).lower()
-            label = f"Loss, {words}{whose and ', second design'}, contact by the {law} law"
+            of = {"law": law, "whose": whose or name, "words": words, "unit": unit}
+            of["second"] = whose and ", second design"
             if np.isnan(loss):
-                yield Fact(key, label, loss, unit, "—", note="no result")
+                yield _told("contact_{law}_{whose}", loss, "—", note="no result", **of)
                 continue
             count = int(part["overlaps_by_contact"].max())
             gap = worded(float(part["gap_by_contact"].min()), "mm", 2)
@@ -53,7 +55,7 @@ def _by_law(
                 note = f"{percent(change)} against the {own} law{other}; {note}"
             if law == "angle":
                 note += "; the paper's law"
-            yield number(key, label, loss, unit, digits=3, note=note)
+            yield _told("contact_{law}_{whose}", loss, note=note, **of)
 
 
 def overlapping(count: int) -> str:
@@ -65,29 +67,25 @@ def overlapping(count: int) -> str:
 
 def _again(study: StudyResults, again: RedesignResults) -> Iterator[Fact]:
     """Yields the design for contact on distance, in a lattice that obeys it too."""
-    note = "for contact on distance, so that no units overlap"
     words = "the same: its losses by both laws are alike"
     if again.changed:
         words = f"optimised again, {again.evaluations} evaluations"
-    yield Fact("second_design", "Second design", np.nan, "1", words, note=note)
+    yield _told("second_design", np.nan, words)
     if again.changed:
         yield from _by_law(study.problem, again.response, ["cloaked"], "angle", "second")
     loss = over_cases(study.problem, again.response["loss"])
     start, end = (float(loss.sel(structure=name)) for name in ("altered", "cloaked"))
-    note = "from that of the lattice without a cloak, both with contact on distance"
-    yield share("second_loss_reduction", "Its loss reduced by", 1.0 - end / start, note=note)
+    yield _told("second_loss_reduction", 1.0 - end / start)
     measure = measures.measure_of(study.problem)
     values = over_cases(study.problem, measure.of(again.response)).isel(time=-1)
     altered, cloaked = (float(values.sel(structure=name)) for name in ("altered", "cloaked"))
-    note = f"from {worded(altered, measure.unit, 3)} to {worded(cloaked, measure.unit, 3)}"
-    label = f"Its {measure.label[0].lower()}{measure.label[1:]} reduced by"
-    yield share(f"second_{measure.key}_reduction", label, 1.0 - cloaked / altered, note=note)
+    of = {"key": measure.key, "what": f"{measure.label[0].lower()}{measure.label[1:]}"}
+    of |= {"before": worded(altered, measure.unit, 3), "after": worded(cloaked, measure.unit, 3)}
+    yield _told("second_{key}_reduction", 1.0 - cloaked / altered, **of)
     part = again.response.sel(structure="cloaked")
     gap = worded(float(part["min_gap"].min()), "mm", 2)
-    note = f"the most of all loads, by geometry; smallest gap {gap}"
-    yield number("second_overlaps", "Its overlapping pairs", int(part["overlaps"].max()), note=note)
+    yield _told("second_overlaps", int(part["overlaps"].max()), gap=gap)
     yield from stability_facts("second_design", part, "second design")
     history = again.design.isel(method=0)
     violation = float(history["violation"].isel(evaluation=int(history["best_evaluation"])))
-    label = "Its largest constraint violation"
-    yield number("second_violation", label, violation, digits=2, note="scaled; 0: feasible")
+    yield _told("second_violation", violation)

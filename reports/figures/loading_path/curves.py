@@ -78,8 +78,7 @@ def structure_curves(
 def over_cases(problem: Problem, values: xr.DataArray) -> xr.DataArray:
     """Returns weighted mean over the load cases."""
     weights = xr.DataArray(np.array(problem.drive.case_weights), dims="case")
-    mean: xr.DataArray = (values * weights).sum("case", skipna=False) / float(weights.sum())
-    return mean
+    return (values * weights).sum("case", skipna=False) / float(weights.sum())
 
 
 def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Measure) -> None:

@@ -4,7 +4,7 @@ A publication's words for them stand in the problem, under `report.paper.values`
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 import xarray as xr
@@ -17,10 +17,9 @@ from reports.facts import (
     Fact,
     checks,
     constants_facts,
+    facts_of,
     grouped,
-    number,
     recording_facts,
-    share,
     worded,
 )
 from reports.figures.loading_path import contact_comparison, measured, measures, monte_carlo
@@ -37,6 +36,8 @@ from reports.figures.loading_path.curves import over_cases
 from reports.page import RobustTable
 from reports.study import StudyResults, display_name, from_dataset
 from sim.core import Floats
+
+_told = facts_of(__file__)
 
 
 def loading_path_facts(study: StudyResults) -> list[Fact]:
@@ -68,47 +69,45 @@ def scene_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     problem, response = study.problem, study.response
     lattice, paper = problem.lattice, problem.report.paper
     if paper is not None and paper.variant:
-        note = f"the set of values that was run, of Figure {paper.figure}"
-        yield Fact("variant", "Values", np.nan, "1", paper.variant, note=note)
+        yield _told("variant", np.nan, paper.variant, figure=paper.figure)
     initial = from_dataset(study.design, lattice.spacing, "vertices_initial")
-    yield Fact("units", "Units", lattice.n_units, "1", lattice_size(lattice))
-    yield number("spacing", "Spacing", lattice.spacing, "mm")
+    yield _told("units", lattice.n_units, lattice_size(lattice))
+    yield _told("spacing", lattice.spacing)
     if isinstance(lattice, Quads):
         yield checks.bias_fact(initial)
-    yield number("ligament_length", "Ligament length", lattice.ligament_length, "mm")
+    yield _told("ligament_length", lattice.ligament_length)
     removed = initial.n_units - int(from_dataset(study.design, lattice.spacing).present.sum())
     if removed:
-        yield number("removed_units", "Units removed", removed)
-    yield number("cloak_units", "Units redesigned", int((response["region"] == 1).sum()))
-    yield number("interest_units", "Units of interest", int(response["roi"].sum()))
+        yield _told("removed_units", removed)
+    yield _told("cloak_units", int((response["region"] == 1).sum()))
+    yield _told("interest_units", int(response["roi"].sum()))
     yield from _radii(problem)
     if path.static:
         yield _load_fact(path)
         if path.displaces:
             yield from strain_facts(problem, path)
-        count = problem.horizon.steps or problem.horizon.samples
-        yield number("load_steps", "Loads in the loss", count, note="equally spaced")
+        yield _told("load_steps", problem.horizon.steps or problem.horizon.samples)
     else:
-        yield from _drive_facts(problem)
-        yield number("horizon", "Loss taken over", problem.horizon_time, "s")
+        if isinstance(problem.drive, HarmonicDrive | RampHarmonicDrive):
+            yield _told("amplitude", problem.drive.amplitude, name="Amplitude A", unit="mm")
+            yield _told("frequency", problem.drive.frequency)
+        yield _told("horizon", problem.horizon_time)
 
 
 def _radii(problem: Problem) -> Iterator[Fact]:
     """Tells how far round regions reach."""
     spacing = problem.lattice.spacing
-    for key, label, region in (
-        ("interest_radius", "Radius of the region of interest", problem.objective.region),
-        ("void_radius", "Radius of the void", problem.void),
-        ("cloak_radius", "Radius of the cloak", problem.cloak),
+    for key, region in (
+        ("interest_radius", problem.objective.region),
+        ("void_radius", problem.void),
+        ("cloak_radius", problem.cloak),
     ):
         bounds = region.bounds if isinstance(region, Region) else None
         if bounds is not None:
-            yield number(key, label, bounds[2], "mm", note=f"{bounds[2] / spacing:.4g} spacings")
+            yield _told(key, bounds[2], spacings=bounds[2] / spacing)
     width = _cloak_width(problem)
     if width is not None:
-        yield number(
-            "cloak_width", "Width of the cloak", width, "mm", note=f"{width / spacing:.4g} spacings"
-        )
+        yield _told("cloak_width", width, spacings=width / spacing)
 
 
 def _cloak_width(problem: Problem) -> float | None:
@@ -128,7 +127,7 @@ def _load_fact(path: Abscissa) -> Fact:
     note = "of the driven units, along the drive" if path.displaces else "on the driven units"
     if path.strain is not None:
         note += f"; the paper labels it ε = {100 * path.strain:g} %"
-    return number("amplitude", path.name, float(path.values[-1]), path.unit, note=note)
+    return _told("amplitude", float(path.values[-1]), name=path.name, unit=path.unit, note=note)
 
 
 def strain_facts(problem: Problem, path: Abscissa) -> Iterator[Fact]:
@@ -136,52 +135,53 @@ def strain_facts(problem: Problem, path: Abscissa) -> Iterator[Fact]:
     _, axis = driven_side(problem)
     span = float(np.ptp([site[1 + axis] for site in problem.lattice.sites()]))
     angles = np.degrees(getattr(problem.drive, "directions", ()) or (np.pi,))
-    ends = ("columns", "rows")[axis]
-    note = f"applied displacement over the {worded(span, 'mm', 4)} between the outermost {ends}"
+    words = {"span": worded(span, "mm", 4), "ends": ("columns", "rows")[axis]}
     kinds = dict.fromkeys(load_kind(problem, float(angle)) for angle in angles)
     for place, kind in enumerate(kinds):
         key = "strain" if place == 0 else f"strain_{kind}"
-        yield share(key, kind.capitalize(), float(path.values[-1]) / span, note=note)
+        yield _told(
+            "{key}", float(path.values[-1]) / span, key=key, kind=kind.capitalize(), **words
+        )
 
 
-def _drive_facts(problem: Problem) -> Iterator[Fact]:
-    """Yields amplitude and frequency of a harmonic drive."""
-    if isinstance(problem.drive, HarmonicDrive | RampHarmonicDrive):
-        yield number("amplitude", "Amplitude A", problem.drive.amplitude, "mm")
-        yield number("frequency", "Frequency f", problem.drive.frequency, "Hz")
+def _each(
+    study: StudyResults,
+    key: str,
+    values: xr.DataArray,
+    names: Iterable[str] = ("altered", "cloaked"),
+    /,
+    **words: object,
+) -> Iterator[Fact]:
+    """Yields a fact of each structure, of values (structure,): the words `key`_{structure}."""
+    for name in names:
+        shown = display_name(study.problem, name).lower()
+        value = float(values.sel(structure=name))
+        yield _told(f"{key}_{{structure}}", value, structure=name, shown=shown, **words)
 
 
 def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     """Yields the measure of path or motion, and its reduction by the cloak."""
     measure = measures.measure_of(study.problem)
-    values = over_cases(study.problem, measure.of(study.response))
+    each = measure.of(study.response)
+    values = over_cases(study.problem, each)
     where = f"at {path.at(-1)}" if path.static else "root mean square over the time shown"
     whole = measures.overall(study.problem, values)
+    of = {"key": measure.key, "what": measure.label, "unit": measure.unit}
+    of_cases = measures.overall(study.problem, each)
     for name in ("altered", "cloaked"):
-        label = f"{measure.label}, {display_name(study.problem, name).lower()}"
-        found, note = float(whole.sel(structure=name)), f"{where}{measure.formula}"
-        yield number(f"{measure.key}_{name}", label, found, measure.unit, digits=3, note=note)
-        yield from _each_load(
-            study,
-            f"{measure.key}_{name}",
-            measure.label,
-            measures.overall(study.problem, measure.of(study.response)),
-            name,
-            measure.unit,
-        )
+        told = {"where": where, "formula": measure.formula}
+        yield from _each(study, "{key}", whole, [name], **of, **told)
+        key = f"{measure.key}_{name}"
+        yield from _each_load(study, key, measure.label, of_cases, name, measure.unit)
     altered, cloaked = (values.sel(structure=name) for name in ("altered", "cloaked"))
-    label = f"{measure.label} reduced by"
     gain = 1.0 - float(whole.sel(structure="cloaked") / whole.sel(structure="altered"))
-    yield share(f"{measure.key}_reduction", label, gain, note=where)
+    yield _told("{key}_reduction", gain, key=measure.key, what=measure.label, note=where)
     if path.static:
         gains = (1.0 - cloaked / altered).isel(time=slice(altered.sizes["time"] // 2, None))
-        key, least = f"{measure.key}_reduction_least", float(gains.min())
-        note = "the least over the second half of the path"
-        yield share(key, f"{label}, at least", least, note=note)
-    key, most = f"{measure.key}_cloaked_most", float(cloaked.max())
-    label = f"{measure.label}, cloaked, at most"
+        least = float(gains.min())
+        yield _told("{key}_reduction_least", least, key=measure.key, what=measure.label)
     note = "the largest on the whole path" if path.static else "the largest at any time"
-    yield number(key, label, most, measure.unit, digits=3, note=note)
+    yield _told("{key}_cloaked_most", float(cloaked.max()), note=note, **of)
 
 
 def _each_load(
@@ -191,11 +191,9 @@ def _each_load(
     loads = load_names(study.problem, study.response)
     part = values.sel(structure=name)
     ends = part.isel(time=-1) if "time" in part.dims else part
+    of = {"key": key, "shown": display_name(study.problem, name).lower(), "unit": unit}
     for case, load in enumerate(loads if len(loads) > 1 else ()):
-        told = f"{label}, {display_name(study.problem, name).lower()}, {load}"
-        yield number(
-            f"{key}_case{case}", told, float(ends[case]), unit, digits=3, note="one load case"
-        )
+        yield _told("{key}_case{case}", float(ends[case]), case=case, load=load, of=label, **of)
 
 
 def loss_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
@@ -203,10 +201,10 @@ def loss_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     unit = "N mm" if study.problem.objective.kind == "strain_energy" else "1"
     start, end = mean_losses(study)
     for key, name, value in (("start", "altered", start), ("end", "cloaked", end)):
-        label = f"Loss, {display_name(study.problem, name).lower()}"
-        yield number(f"loss_{key}", label, value, unit, digits=3)
+        shown = display_name(study.problem, name).lower()
+        yield _told("loss_{key}", value, key=key, shown=shown, unit=unit)
         yield from _each_load(study, f"loss_{key}", "Loss", study.response["loss"], name, unit)
-    yield share("loss_reduction", "Loss reduced by", 1.0 - end / start)
+    yield _told("loss_reduction", 1.0 - end / start)
     yield from _snap_facts(study, path, end, unit)
     yield from checks.error_facts(study.response, "relative; the largest of all structures")
 
@@ -226,22 +224,23 @@ def _snap_facts(study: StudyResults, path: Abscissa, loss: float, unit: str) -> 
     loads = np.unique(known[np.isfinite(known)])
     if not len(loads):
         return
-    places = np.interp(loads, part["time"].values, path.values)
-    where = " and ".join(worded(float(place), path.unit, 3) for place in places)
-    other = float(
-        over_cases(study.problem, study.response["loss_other_branch"]).sel(structure="cloaked")
-    )
+
+    def places(loads: Floats) -> tuple[float, str]:
+        found = np.interp(loads, part["time"].values, path.values)
+        words = " and ".join(worded(float(place), path.unit, 3) for place in found)
+        return float(found[0]), words
+
+    losses = over_cases(study.problem, study.response["loss_other_branch"])
+    other = float(losses.sel(structure="cloaked"))
     words, note = worded(loss, unit, 3), "at a limit point; the loss is that after it"
     if np.isfinite(other):
         words += f" or {worded(other, unit, 3)}"
         note = "where the path branches; the loss on either branch"
     turns = _turns(part["traced_load"].values)
     if len(turns):
-        way = np.interp(turns, part["time"].values, path.values)
-        to = " and ".join(worded(float(place), path.unit, 3) for place in way)
-        note += f"; traced by arc length, the path that it leaves turns at {to}"
-    ours = f"snaps at {where}: {words}"
-    yield Fact("snaps", "Loss, cloaked", float(places[0]), path.unit, ours, note=note)
+        note += f"; traced by arc length, the path that it leaves turns at {places(turns)[1]}"
+    first, where = places(loads)
+    yield _told("snaps", first, f"snaps at {where}: {words}", unit=path.unit, note=note)
 
 
 def _turns(loads: Floats) -> Floats:
@@ -256,53 +255,31 @@ def contraction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     """Yields change of the vertical distance between top and bottom rows."""
     if not path.static:
         return
-    nearer = over_cases(study.problem, measures.contraction(study.problem, study.response)).isel(
-        time=-1
-    )
-    count = len(middle_units(study.problem, "top"))
-    note = f"how much nearer top and bottom rows come, mean of the middle {count} units"
-    for name in structures(study.response):
-        label = f"Contraction, {display_name(study.problem, name).lower()}"
-        value = float(nearer.sel(structure=name))
-        yield number(f"contraction_{name}", label, value, "mm", digits=3, note=note)
+    every = over_cases(study.problem, measures.contraction(study.problem, study.response))
+    nearer, count = every.isel(time=-1), len(middle_units(study.problem, "top"))
+    yield from _each(study, "contraction", nearer, structures(study.response), count=count)
     if "intact" in structures(study.response):
-        intact = float(nearer.sel(structure="intact"))
-        for name in ("altered", "cloaked"):
-            off = float(nearer.sel(structure=name)) / intact - 1.0
-            label = f"Contraction, {display_name(study.problem, name).lower()}, off the intact by"
-            yield share(f"contraction_error_{name}", label, off)
+        off = nearer / float(nearer.sel(structure="intact")) - 1.0
+        yield from _each(study, "contraction_error", off)
 
 
 def reaction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     """Yields force of the drive at the end of the path, or how far its load goes."""
     if not path.static:
         return
+    names, where = structures(study.response), path.at(-1)
     if not path.displaces:
-        yield from _displacement_facts(study, path)
+        moved = over_cases(study.problem, measures.driven_displacement(study.response))
+        yield from _each(study, "displacement", moved.isel(time=-1), names, where=where)
         return
     every = measures.reaction(study.response)
     force = over_cases(study.problem, every).isel(time=-1)
-    note = f"on the driven units, along the drive, at {path.at(-1)}"
-    for name in structures(study.response):
-        label = f"Reaction, {display_name(study.problem, name).lower()}"
-        value = float(force.sel(structure=name))
-        yield number(f"reaction_{name}", label, value, "N", digits=3, note=note)
+    for name in names:
+        yield from _each(study, "reaction", force, [name], where=where)
         yield from _each_load(study, f"reaction_{name}", "Reaction", every, name, "N")
-    if "intact" in structures(study.response):
-        note = "root mean square along the path, over the intact lattice's at its end"
+    if "intact" in names:
         off = over_cases(study.problem, measures.reaction_error(every))
-        for name in ("altered", "cloaked"):
-            label = f"Reaction, {display_name(study.problem, name).lower()}, off the intact by"
-            yield share(f"reaction_error_{name}", label, float(off.sel(structure=name)), note=note)
-
-
-def _displacement_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
-    moved = over_cases(study.problem, measures.driven_displacement(study.response)).isel(time=-1)
-    note = f"of the driven units, mean, at {path.at(-1)}"
-    for name in structures(study.response):
-        label = f"Displacement, {display_name(study.problem, name).lower()}"
-        value = float(moved.sel(structure=name))
-        yield number(f"displacement_{name}", label, value, "mm", digits=3, note=note)
+        yield from _each(study, "reaction_error", off)
 
 
 def _spreads_of_copies(study: StudyResults) -> Sequence[monte_carlo.Spread]:
@@ -320,12 +297,8 @@ def robustness_facts(study: StudyResults) -> Iterator[Fact]:
     measure = measures.measure_of(study.problem)
     for spread in _spreads_of_copies(study):
         key = re.sub(r"\W+", "_", spread.noise).strip("_")
-        note = (
-            f"5 % to 95 %: {spread.low:.3g} to {spread.high:.3g}; {spread.count} copies, "
-            f"{spread.failed} failed, {spread.clashing} drawn again in part as units overlapped"
-        )
-        label = f"{measure.label}, median, {_in_words(spread.noise)}"
-        yield number(f"copies_{key}", label, spread.middle, measure.unit, digits=3, note=note)
+        of = {"what": measure.label, "noise": _in_words(spread.noise), "unit": measure.unit}
+        yield _told("copies_{key}", spread.middle, key=key, spread=spread, **of)
 
 
 def robust_table(study: StudyResults) -> RobustTable | None:
@@ -358,10 +331,8 @@ def worst_copy_fact(study: StudyResults) -> Iterator[Fact]:
     found = [each for each in _spreads_of_copies(study) if np.isfinite(each.high)]
     if found:
         worst = max(found, key=lambda each: (each.noise.startswith("together"), each.high))
-        label = f"{measure.label}, cloaked, in 95 % of copies at most"
-        note = _in_words(worst.noise)
-        key = f"{measure.key}_cloaked_copies"
-        yield number(key, label, worst.high, measure.unit, digits=3, note=note)
+        of = {"key": measure.key, "what": measure.label, "unit": measure.unit}
+        yield _told("{key}_cloaked_copies", worst.high, note=_in_words(worst.noise), **of)
 
 
 def _in_words(noise: str) -> str:

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.problem.sections import Paper, single_drives
-from reports.base import Table, style
+from reports.base import Table, prose, style
 from reports.facts import JUMPED, Fact
 from reports.figures.loading_path import curves, measures, tables
 from reports.figures.loading_path.abscissa import (
@@ -39,13 +39,7 @@ from reports.study import StudyResults, display_name
 
 TALLEST_SNAPSHOTS = 116.0
 """Height that all snapshots may take, mm."""
-_SECOND = "; dashed purple: the cloak optimised again with contact on distance, under that contact"
-_HISTORY = (
-    "Loss against evaluation; rejected evaluations are dots, infeasible ones pale, the circle is "
-    "the best feasible design. Where a descent has ended, it goes on from a design shifted at "
-    "random: the loss jumps up there."
-)
-
+_PROSE = prose(__file__)
 _KEYS: tuple[Literal["ux", "uy", "theta"], ...] = ("ux", "uy", "theta")
 Curve = tuple[str, Callable[[Axes], None], str, Sequence[Table]]
 
@@ -60,11 +54,9 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
     low = top + head + grid.lines * grid.side + 2.0
     colours = shade_of(problem, study.response).field.label.replace("u_y", "u<sub>y</sub>")
     symbol = "Loss (N mm)" if problem.objective.kind == "strain_energy" else r"Loss $J$"
-    clamped = (
-        "The structures at rest: dark units are clamped, orange ones driven along the arrows, "
-        "purple ones redesigned"
-        + (", grey ones stiffened" if problem.inclusion is not None else "")
-        + (", green ones of interest." if problem.objective.region != "surroundings" else ".")
+    clamped = _PROSE["rest"].format(
+        stiffened=_PROSE["stiffened"] if problem.inclusion is not None else "",
+        interest=_PROSE["interest"] if problem.objective.region != "surroundings" else "",
     )
     panels = [
         *design_panels(study, symbol, clamped),
@@ -95,7 +87,7 @@ def design_panels(
     design, history = tables.of_design(study)
     return [
         Panel(("a", "", 0.0, 0.8), at_rest, caption, [design]),
-        Panel(("b", "Optimisation", 123.0, 0.8), optimisation, _HISTORY, [history]),
+        Panel(("b", "Optimisation", 123.0, 0.8), optimisation, _PROSE["history"], [history]),
     ]
 
 
@@ -126,41 +118,28 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
     words = f"{measure.label}{measure.formula}{marks([study])}."
     yield measure.label, lambda axes: curves.measure_panel(axes, study, path, measure), words, way
     if path.static and problem.objective.target != "rest":
-        words = "How much nearer the top and the bottom row come, mean over the middle columns."
-        yield (
-            "Lateral contraction",
-            lambda axes: curves.contraction_panel(axes, study, path),
-            words,
-            (),
-        )
+        panel = curves.contraction_panel
+        words = _PROSE["contraction"]
+        yield "Lateral contraction", lambda axes: panel(axes, study, path), words, ()
     yield _answer(study, path)
     if (copies := study.scatter) is not None:
-        words = (
-            f"The measure of panel d{' at the end of the path' if path.static else ''} over "
-            "imperfect cloaks: median and 5 % to 95 %; dashed without, dotted with the perfect "
-            "cloak."
-        )
-        table = Table(
-            "robustness.csv", "imperfect copies, one a line", tables.copies(study, copies)
-        )
+        words = _PROSE["copies"].format(end=" at the end of the path" if path.static else "")
+        told = "imperfect copies, one a line"
+        table = Table("robustness.csv", told, tables.copies(study, copies))
         title = f"{copies['sample'].size} imperfect cloaks"
-        panel = curves.robustness_panel
-        yield title, lambda axes: panel(axes, study, measure, copies), words, [table]
+        spread = curves.robustness_panel
+        yield title, lambda axes: spread(axes, study, measure, copies), words, [table]
 
 
 def _answer(study: StudyResults, path: Abscissa) -> Curve:
     """Returns the curve of what the driven units do: displacement under a load, else force."""
-    ends = "where it vanishes a path ends, and the structure snaps"
-    stiffness = f"; dotted, smallest eigenvalue of the tangent at fixed supports and drive: {ends}"
+    stiffness = _PROSE["eigenvalue"] if path.static else ""
     if path.static and not path.displaces:
-        words = "Displacement of the driven units, mean, along the drive or along x"
-        panel = curves.displacement_panel
-        return "Displacement", lambda axes: panel(axes, study, path), f"{words}{stiffness}.", ()
-    words = "Force of the drive along its direction" + (stiffness if path.static else "")
+        words, panel = _PROSE["displacement"] + stiffness, curves.displacement_panel
+        return "Displacement", lambda axes: panel(axes, study, path), f"{words}.", ()
+    words = _PROSE["force"] + stiffness
     if np.isfinite(study.response["snap_load"]).any():
-        words += (
-            "; vertical lines, snaps; dashed, the path that the first leaves, traced by arc length"
-        )
+        words += _PROSE["snaps"]
     return "Reaction", lambda axes: curves.reaction_panel(axes, study, path), f"{words}.", ()
 
 
@@ -181,11 +160,8 @@ def marks(studies: Sequence[StudyResults]) -> str:
     bands = any(study.scatter is not None for study in studies)
     jumps = any((study.response["stability"] >= JUMPED).any() for study in studies)
     second = any(study.redesign is not None and study.redesign.changed for study in studies)
-    return (
-        ("; the bands hold 90 % of the imperfect cloaks" if bands else "")
-        + ("; crosses mark jumps to another branch" if jumps else "")
-        + (_SECOND if second else "")
-    )
+    shown = {"bands": bands, "jumps": jumps, "second": second}
+    return "".join(_PROSE[name] for name, there in shown.items() if there)
 
 
 def loading_path_animation(study: StudyResults) -> Animation:
@@ -234,8 +210,5 @@ def credit(paper: Paper | None) -> str:
     source = ""
     if paper is not None:
         variant = f" Run with its values: {paper.variant}." if paper.variant else ""
-        source = (
-            f"After Figure {paper.figure} of Bordiga et al., “Nonlinear mechanical metamaterial "
-            f"cloaks”.{variant} "
-        )
-    return f"{source}Every number here is computed from the datasets."
+        source = _PROSE["after"].format(figure=paper.figure, variant=variant)
+    return source + _PROSE["computed"]

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from pipeline.comparison import compute_reduction
 from reports.base import style
-from reports.facts import MEASURED, Fact, intervals, number, share
+from reports.facts import MEASURED, Fact, facts_of, intervals
 from reports.figures.loading_path import measures
 from reports.figures.loading_path.abscissa import Abscissa
 from reports.figures.loading_path.measures import Measure
@@ -22,6 +22,7 @@ _NAMES = {"rotation": "mean_rotation", "mismatch": "mimicking_error", "contracti
 """What comparisons follow, by the key of the report's measure."""
 _ENDS = ("low", "high")
 _SIDES = ("measured", "simulated")
+_told = facts_of(__file__)
 
 
 def response(study: StudyResults, path: Abscissa, recording: RecordedMotion) -> xr.Dataset:
@@ -42,8 +43,7 @@ def curve(study: StudyResults, path: Abscissa, recording: RecordedMotion, of: Of
     values = of(made).sel(structure=recording.structure).isel(case=0)
     motion = made["displacement"].sel(structure=recording.structure).isel(case=0)
     seen = motion.notnull().any(("unit", "dof"))
-    found: Floats = values.where(seen).transpose("time").values
-    return found
+    return values.where(seen).transpose("time").values
 
 
 def measured_curves(
@@ -99,38 +99,39 @@ def measured_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     for each in study.recordings:
         values = curve(study, path, each, lambda made: measures.contraction(study.problem, made))
         ends[each.structure] = values[-1]
-        name = display_name(study.problem, each.structure).lower()
-        key = f"{MEASURED}contraction_{each.structure}"
-        label = f"Contraction, {name}, measured"
         note = f"{each.source}; {_interval(each, path, 'contraction')}"
-        yield number(key, label, values[-1], "mm", digits=3, note=note)
-    for structure in ("altered", "cloaked"):
-        if structure in ends and "intact" in ends:
-            off = ends[structure] / ends["intact"] - 1.0
-            name = display_name(study.problem, structure).lower()
-            label = f"Contraction, {name}, off the intact by, measured"
-            note = _change(study, path, "contraction", ("intact", structure), sign=-1)
-            yield share(f"{MEASURED}contraction_error_{structure}", label, off, note=note)
+        yield _of(study, "contraction_{structure}", each.structure, values[-1], note=note)
+    for name in ("altered", "cloaked"):
+        if name in ends and "intact" in ends:
+            off = ends[name] / ends["intact"] - 1.0
+            note = _change(study, path, "contraction", ("intact", name), sign=-1)
+            yield _of(study, "contraction_error_{structure}", name, off, note=note)
+
+
+def _of(study: StudyResults, key: str, structure: str, value: float, /, **words: object) -> Fact:
+    """Makes a measured fact of a structure."""
+    shown = display_name(study.problem, structure).lower()
+    key = f"{{measured}}{key}"
+    return _told(key, value, measured=MEASURED, structure=structure, shown=shown, **words)
 
 
 def _measure_facts(study: StudyResults, path: Abscissa, measure: Measure) -> Iterator[Fact]:
     ends: dict[str, float] = {}
+    of = {"key": measure.key, "what": measure.label, "unit": measure.unit}
     for each in study.recordings:
         if each.structure == "intact":
             continue
         values = curve(study, path, each, measure.of)
         ends[each.structure] = values[-1]
-        label = f"{measure.label}, {display_name(study.problem, each.structure).lower()}, measured"
-        key = f"{MEASURED}{measure.key}_{each.structure}"
-        note = f"{each.source}; {_interval(each, path, measure.key)}"
-        yield number(key, label, values[-1], measure.unit, digits=3, note=note.removesuffix("; "))
+        note = f"{each.source}; {_interval(each, path, measure.key)}".removesuffix("; ")
+        yield _of(study, "{key}_{structure}", each.structure, values[-1], note=note, **of)
         most = float(np.nanmax(values))
-        yield number(f"{key}_most", f"{label}, at most", most, measure.unit, digits=3)
+        yield _of(study, "{key}_{structure}_most", each.structure, most, **of)
     if {"altered", "cloaked"} <= ends.keys():
         gain = 1.0 - ends["cloaked"] / ends["altered"]
-        label = f"{measure.label} reduced by, measured"
         note = _change(study, path, measure.key, ("altered", "cloaked"))
-        yield share(f"{MEASURED}{measure.key}_reduction", label, gain, note=note)
+        words = {"measured": MEASURED, "key": measure.key, "what": measure.label}
+        yield _told("{measured}{key}_reduction", gain, note=note, **words)
 
 
 def _interval(recording: RecordedMotion, path: Abscissa, key: str) -> str:

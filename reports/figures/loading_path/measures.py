@@ -105,16 +105,14 @@ def interest(response: xr.Dataset) -> xr.DataArray:
 def squares(displacement: xr.DataArray, scale: tuple[float, float, float]) -> xr.DataArray:
     """Returns sum of squares of dimensionless displacements (..., dof)."""
     divisors = xr.DataArray(np.array(scale), dims="dof", coords={"dof": displacement["dof"]})
-    squares: xr.DataArray = ((displacement / divisors) ** 2).sum("dof")
-    return squares
+    return ((displacement / divisors) ** 2).sum("dof")
 
 
 def contraction(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     """Finds how much nearer top and bottom units of the lattice's middle half come, mm."""
     top, bottom = (middle_units(problem, side) for side in ("top", "bottom"))
     rise = response["displacement"].sel(dof="uy")
-    nearer: xr.DataArray = rise.sel(unit=bottom).mean("unit") - rise.sel(unit=top).mean("unit")
-    return nearer
+    return rise.sel(unit=bottom).mean("unit") - rise.sel(unit=top).mean("unit")
 
 
 def driven_displacement(response: xr.Dataset) -> xr.DataArray:

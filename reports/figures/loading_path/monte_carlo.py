@@ -27,8 +27,7 @@ def copy_curves(
 ) -> xr.DataArray:
     """Returns the measure (noise, sample, time) of every copy, NaN where it failed."""
     if measure.key == "rotation":
-        turned: xr.DataArray = np.degrees(copies["rotation"])  # type: ignore[assignment]
-        return turned
+        return np.degrees(copies["rotation"])  # type: ignore[return-value]
     if measure.key == "motion":
         return copies["departure"]
     count = int(response["roi"].sum())

@@ -6,7 +6,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from reports.base import style
+from reports.base import prose, style
 from reports.figures.several_designs.designs import RADIUS, DesignSeries, SeriesDesign
 from reports.panels import Panel, PanelFigure, colour_bar, draw, draw_clamps, outline
 from reports.study import from_dataset
@@ -15,6 +15,7 @@ PER_ROW = 3
 """Panels in a row; the first is the curve."""
 
 LEFT, BAR, GAP, HEAD = 2.0, 16.0, 2.0, 11.0
+_PROSE = prose(__file__)
 
 
 def design_series_figure(family: DesignSeries) -> PanelFigure:
@@ -26,15 +27,12 @@ def design_series_figure(family: DesignSeries) -> PanelFigure:
         Panel(
             ("a", "Shielding of the boundary", 0.0, 0.8),
             lambda figure: _curve(style.place(figure, 13.0, HEAD, side - 9.0, side - 12.0), family),
-            f"Largest |U| of a unit of the outer rows and columns against {over}: altered "
-            "(dashed) and cloaked structures, mean over the load angles of the greatest in time.",
+            _PROSE["a"].format(over=over),
         ),
         Panel(
             ("b", "Peak displacement", side + GAP, 0.8),
             lambda figure: _structures(figure, family, side, rows),
-            "Altered and cloaked structures, coloured by the largest |U| of each unit in time, "
-            "mean over the load angles; |U| counts displacements in spacings, rotations in "
-            "radians. Dashed circles bound the cloaks, hatched pads clamp the corners.",
+            _PROSE["b"],
         ),
     ]
     draft = [reason for design in family.designs for reason in design.study.draft]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pipeline.problem.reading import JointFigure, joint_figure
 from pipeline.runtime import UserError
-from reports.base import Table
+from reports.base import Table, prose
 from reports.facts import Fact, fact_records
 from reports.figures import loading_path
 from reports.figures.loading_path import abscissa_of, measures, structures
@@ -15,6 +15,8 @@ from reports.figures.several_studies.figure import heading, several_studies_figu
 from reports.page import PageText, Report, publish, study_page
 from reports.panels import Animation, case_labels, structure_clip
 from reports.study import StudyResults, display_name, study_results
+
+_PROSE = prose(__file__)
 
 
 def several_studies_report(
@@ -65,21 +67,16 @@ def _credit(studies: Sequence[StudyResults]) -> str:
     """Tells which publication the studies follow, and with which of its values."""
     papers = {p.figure: p.variant for study in studies if (p := study.problem.report.paper)}
     source = "".join(
-        f"After Figure {name} of Bordiga et al., “Nonlinear mechanical metamaterial cloaks”"
+        _PROSE["after"].format(figure=name)
         + (f", run with its values: {variant}. " if variant else ". ")
         for name, variant in papers.items()
     )
-    return source + "Every number here is computed from the datasets."
+    return source + loading_path.credit(None)
 
 
 def _caption(studies: Sequence[StudyResults]) -> str:
     names = ", ".join(heading(study).lower() for study in studies)
-    return (
-        f"Structures ({names}) before loading and at full load, true to scale, coloured by "
-        "u<sub>y</sub>: intact, without and with a cloak. Below, for each: how much nearer the top "
-        "and the bottom row come, mean over the middle columns, and the mimicking error along "
-        f"the load{loading_path.marks(studies)}."
-    )
+    return str(_PROSE["caption"]).format(names=names, marks=loading_path.marks(studies))
 
 
 def _animation(studies: Sequence[StudyResults]) -> Animation:

@@ -12,18 +12,16 @@ import xarray as xr
 
 from pipeline.comparison import compute_reduction
 from reports.facts import (
-    ABSENT,
     MEASURED,
     Fact,
     checks,
     constants_facts,
+    facts_of,
     foil,
     grouped,
     measures,
-    number,
     percent,
     recording_facts,
-    share,
     worded,
 )
 from reports.figures.shielding.sweep_map import frequency_map
@@ -43,16 +41,12 @@ MONITORED = 45.0
 
 PAPER_REDUCTION = 0.7
 """The paper's mean reduction of |U|, "approximately 70 %"."""
+_told = facts_of(__file__)
 
 
 def shielding_facts(study: StudyResults) -> list[Fact]:
     """Returns all facts of Figure 2, under headings."""
-    scene, design, response, sweep = (
-        study.scene,
-        study.design,
-        study.response,
-        frequency_map(study.sweep),
-    )
+    scene, design, response = study.scene, study.design, study.response
     return [
         *grouped("Scene", scene_facts(scene, design)),
         *grouped("Shielding", loss_facts(scene, response)),
@@ -61,7 +55,7 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
         *grouped("Motion of the middle unit of the top edge", motion_facts(scene, response)),
         *grouped("Measured motion of the same unit", recorded_facts(study)),
         *recording_facts.recorded_facts(study.recordings),
-        *grouped("Robustness", map_facts(sweep)),
+        *grouped("Robustness", map_facts(frequency_map(study.sweep))),
         *grouped(
             "With the constants’ measured spread",
             constants_facts(study.problem, study.constants, mean_losses(scene, response)),
@@ -74,51 +68,37 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
 def scene_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
     """Yields the problem as it was run."""
     initial = from_dataset(design, scene.spacing, "vertices_initial")
-    size = f"{scene.columns} × {scene.rows}"
-    yield Fact("units", "Units", initial.n_units, "1", size, "15 × 15")
-    yield number("spacing", "Spacing", scene.spacing, "mm", paper="15 mm")
+    yield _told("units", initial.n_units, f"{scene.columns} × {scene.rows}")
+    yield _told("spacing", scene.spacing)
     yield replace(checks.bias_fact(initial), paper="20°")
-    yield number("amplitude", "Amplitude A", scene.amplitude, "mm", paper="4.5 mm")
-    yield number("frequency", "Frequency f", scene.frequency, "Hz", paper="2 Hz")
-    yield number("period", "Period T", 1e3 * scene.period, "ms")
+    yield _told("amplitude", scene.amplitude)
+    yield _told("frequency", scene.frequency)
+    yield _told("period", 1e3 * scene.period)
     angles = ", ".join(f"{angle:g}" for angle in scene.directions) + "°"
-    count = len(scene.directions)
-    yield Fact("directions", "Loading angles α", count, "1", angles, "0, 45, 90, 135°")
+    yield _told("directions", len(scene.directions), angles)
     radius = scene.radii[-1]
     words = f"{worded(radius, 'mm', 4)} = {radius / scene.spacing:g} spacings"
     reach = measures.site_radius(initial, scene.middle, CLOAK) / scene.spacing
-    note = f"4.5 is the authors' code, 4 their text; the farthest cloak unit lies at {reach:.3g}"
-    yield Fact("radius", "Cloak radius", radius, "mm", words, "60 mm = 4 spacings", note)
-    note = f"{scene.horizon * scene.frequency:g} drive cycles from rest"
-    yield number("horizon", "Loss taken over", scene.horizon, "s", note=note)
+    yield _told("radius", radius, words, reach=reach)
+    yield _told("horizon", scene.horizon, cycles=scene.horizon * scene.frequency)
 
 
 def loss_facts(scene: ReportScene, response: xr.Dataset) -> Iterator[Fact]:
     """Yields reduction of |U| and the loss before and after."""
-    everything = float(response["time"][-1])
-    for suffix, label, until, paper in (
-        ("", "Mean |U| reduced by", scene.horizon, "≈ 70 %"),
-        ("_all", "Mean |U| reduced by, all cycles", everything, "—"),
-    ):
+    for suffix, until in (("", scene.horizon), ("_all", float(response["time"][-1]))):
         mean = scene.mean(measures.mean_magnitude(response, scene, until))
-        note = f"mean over the region of interest, all load cases and {until:g} s"
-        yield share(f"mean_reduction{suffix}", label, measures.reduction(mean), paper, note)
-    note = f"time integral over {scene.horizon:g} s"
+        yield _told(f"mean_reduction{suffix}", measures.reduction(mean), until=until)
     start, end = mean_losses(scene, response)
-    yield loss_fact("loss_start", "Loss J, altered", start, note=note)
-    paper = f"≈ {paper_loss(start):.2g}"
-    note += "; the paper's is inferred from its 70 %, (1 − 0.7)² of ours at the start"
-    yield loss_fact("loss_end", "Loss J, cloaked", end, paper, note)
+    yield _loss("loss_start", start, until=scene.horizon)
+    yield _loss("loss_end", end, until=scene.horizon, quoted=paper_loss(start))
     for key, name in (("start", "altered"), ("end", "cloaked")):
         value = mean_loss(scene, response, "loss_samples", name)
-        label = f"Loss J, {name}, mean of samples"
-        note = "the authors' mean over the saved samples of the same time"
-        yield loss_fact(f"loss_samples_{key}", label, value, note=note)
+        yield _loss("loss_samples_{key}", value, key=key, name=name)
 
 
-def loss_fact(key: str, label: str, value: float, paper: str = ABSENT, note: str = "") -> Fact:
+def _loss(key: str, value: float, /, **words: object) -> Fact:
     """Returns fact of a loss, to four decimals."""
-    return Fact(key, label, value, "1", f"{value:.4f}", paper, note)
+    return _told(key, value, f"{value:.4f}", **words)
 
 
 def mean_loss(scene: ReportScene, response: xr.Dataset, variable: str, structure: str) -> float:
@@ -140,21 +120,14 @@ def paper_loss(start: float) -> float:
 def history_facts(design: xr.Dataset) -> Iterator[Fact]:
     """Yields evaluations and best feasible loss of every method."""
     for method in design["method"].values:
-        history = design.sel({"method": method})
-        loss = history["loss"].values
+        history, of = design.sel({"method": method}), {"method": method, "name": method.upper()}
+        loss, at = history["loss"].values, int(history["best_evaluation"])
         count, best = int(np.isfinite(loss).sum()), float(history["best_loss"])
-        name, ours = str(method).upper(), method == design.attrs.get("shipped_method")
         soon = measures.first_within(loss[:count], best, 0.9)
-        note = (
-            f"best feasible after {int(history['best_evaluation'])}, 90 % of the way after {soon}"
-        )
-        yield number(
-            f"evaluations_{method}", f"Evaluations, {name}", count, paper="≈ 150", note=note
-        )
-        note = "shipped" if ours else "not shipped"
-        yield loss_fact(f"best_{method}", f"Best feasible J, {name}", best, note=note)
-        residual = float(history["kkt_residual"])
-        yield number(f"kkt_{method}", f"KKT residual, {name}", residual, digits=2)
+        yield _told("evaluations_{method}", count, at=at, soon=soon, **of)
+        note = "shipped" if method == design.attrs.get("shipped_method") else "not shipped"
+        yield _loss("best_{method}", best, note=note, **of)
+        yield _told("kkt_{method}", float(history["kkt_residual"]), **of)
 
 
 def shape_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
@@ -162,47 +135,30 @@ def shape_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
     structure = from_dataset(design, scene.spacing)
     initial = from_dataset(design, scene.spacing, "vertices_initial")
     distances = measures.asymmetry(structure, scene.middle)
+    largest = worded(float(distances.max()), "mm", 2)
+    imposed = "imposed here, not in the paper" if scene.symmetry == "C4" else "not imposed"
     rms = float(np.sqrt(np.mean(distances**2)))
-    note = (
-        "RMS distance of the cloak's vertices from those of the design turned by 90°; "
-        f"largest {worded(float(distances.max()), 'mm', 2)}; "
-        + ("imposed here, not in the paper" if scene.symmetry == "C4" else "not imposed")
-    )
-    label, told = "Departure from four-fold symmetry", "symmetric"
-    yield number("asymmetry", label, rms, "mm", digits=2, paper=told, note=note)
+    yield _told("asymmetry", rms, largest=largest, imposed=imposed)
     inner, outer = (scene.radii[-1] + side * 0.5 * scene.spacing for side in (-1.0, 1.0))
-    for key, where, low, high, paper in (
-        ("centre", "centre of the cloak", 0.0, inner, "high"),
-        ("rim", "boundary of the cloak", inner, outer, "low"),
-    ):
+    for key, low, high in (("centre", 0.0, inner), ("rim", inner, outer)):
         before, after = (
             measures.porosity(each, scene.middle, low, high) for each in (initial, structure)
         )
-        note = f"open share from {low:g} to {high:g} mm off the source; {percent(before)} initially"
-        yield share(f"porosity_{key}", f"Porosity, {where}", after, paper, note)
+        yield _told(f"porosity_{key}", after, low=low, high=high, before=percent(before))
 
 
 def motion_facts(scene: ReportScene, response: xr.Dataset) -> Iterator[Fact]:
     """Yields peak-to-peak u_y of the unit in the middle of the top edge."""
     series = monitored(scene, response)
-    angle = float(series["direction"])
-    yield number("monitored_angle", "Loading angle α of it", angle, "deg")
-    yield number("monitored_cycles", "Cycles shown", cycles(scene, response), digits=3)
-    for suffix, count, paper in (
-        ("", cycles(scene, response), ("5.2 mm", "1.9 mm", "63 %")),
-        ("_horizon", scene.horizon * scene.frequency, ("—", "—", "—")),
-    ):
+    angle, shown = float(series["direction"]), cycles(scene, response)
+    yield _told("monitored_angle", angle)
+    yield _told("monitored_cycles", shown)
+    for suffix, count in (("", shown), ("_horizon", scene.horizon * scene.frequency)):
         span = measures.peak_to_peak(series, count * scene.period)
-        window = f"cycles 1 to {count:.3g}"
-        note = f"α = {angle:g}°, from rest, transient included"
-        for name, quoted in zip(("altered", "cloaked"), paper, strict=False):
-            label = f"u_y peak-to-peak, {name}, {window}"
-            value = float(span.sel(structure=name))
-            key = f"peak_to_peak_{name}{suffix}"
-            yield number(key, label, value, "mm", digits=3, paper=quoted, note=note)
-        label = f"u_y peak-to-peak reduced by, {window}"
-        key = f"peak_to_peak_reduction{suffix}"
-        yield share(key, label, measures.reduction(span), paper[2], note)
+        words = {"angle": angle, "count": count}
+        for name in ("altered", "cloaked"):
+            yield _told(f"peak_to_peak_{name}{suffix}", float(span.sel(structure=name)), **words)
+        yield _told(f"peak_to_peak_reduction{suffix}", measures.reduction(span), **words)
 
 
 def monitored(scene: ReportScene, response: xr.Dataset) -> xr.DataArray:
@@ -228,15 +184,12 @@ def recorded_facts(study: StudyResults) -> Iterator[Fact]:
             found.sel(source=source).values for source in ("measured", "simulated")
         ]
         words = recording_facts.intervals(sides[0][1:], sides[1][1:], " mm")
-        note = f"{each.source}; {words}"
-        label = f"u_y peak-to-peak, {each.structure}, measured"
-        key = f"{MEASURED}peak_to_peak_{each.structure}"
-        yield number(key, label, float(sides[0][0]), "mm", digits=3, note=note)
+        of = {"start": MEASURED, "structure": each.structure, "source": each.source}
+        yield _told("{start}peak_to_peak_{structure}", float(sides[0][0]), words=words, **of)
     if {"altered", "cloaked"} <= spans.keys():
-        label = "u_y peak-to-peak reduced by, measured"
         gain, predicted = map(compute_reduction, spans["altered"], spans["cloaked"])
         note = recording_facts.intervals(100 * gain[1:], 100 * predicted[1:], " %")
-        yield share(f"{MEASURED}peak_to_peak_reduction", label, float(gain[0]), note=note)
+        yield _told("{start}peak_to_peak_reduction", float(gain[0]), start=MEASURED, note=note)
 
 
 def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:
@@ -244,37 +197,27 @@ def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:
     loss, ratio = sweep["loss"], sweep["loss"] / sweep["loss_altered"]
     worst = loss.where(loss == loss.max(), drop=True)
     angle, rate = float(worst["direction"][0]), float(worst["frequency"][0])
-    note = f"at α = {angle:g}°, f = {rate:g} Hz"
-    yield loss_fact("map_max", "Largest J over the map", float(loss.max()), "< 0.35", note)
-    yield loss_fact("map_min", "Smallest J over the map", float(loss.min()))
-    note = "1 − √(J / J of the altered structure) at the worst point"
-    yield share(
-        "map_reduction", "RMS |U| reduced at least by", 1 - float(np.sqrt(ratio.max())), note=note
-    )
-    for key, label, axis, unit, of, paper in (
-        ("map_angles", "Angles α", "direction", "°", "deg", "0–180°"),
-        ("map_frequencies", "Frequencies f", "frequency", " Hz", "Hz", "2–16 Hz"),
+    yield _loss("map_max", float(loss.max()), angle=angle, rate=rate)
+    yield _loss("map_min", float(loss.min()))
+    yield _told("map_reduction", 1 - float(np.sqrt(ratio.max())))
+    for key, axis, unit in (
+        ("map_angles", "direction", "°"),
+        ("map_frequencies", "frequency", " Hz"),
     ):
         values = sweep[axis].values
         words = f"{values.min():g}–{values.max():g}{unit}"
-        yield Fact(key, label, len(values), "1", words, paper, f"{len(values)} values")
+        yield _told(key, len(values), words, count=len(values))
         for end, edge in (("least", values.min()), ("most", values.max())):
-            yield number(f"{key}_{end}", f"{label}, {end}", float(edge), of)
-    failed = int((sweep["status"] != "ok").sum())
-    yield number("map_failed", "Points without a result", failed, note=f"of {loss.size}")
+            yield _told(f"{key}_{{end}}", float(edge), end=end)
+    yield _told("map_failed", int((sweep["status"] != "ok").sum()), count=loss.size)
 
 
 def check_facts(design: xr.Dataset, response: xr.Dataset) -> Iterator[Fact]:
     """Yields margins of the constraints, geometry and estimated errors of the shipped design."""
     yield from checks.design_facts(design)
     cloaked = response.sel(structure="cloaked")
-    motion = "cloaked, all load cases and times, by geometry"
-    moving = float(cloaked["min_gap"].min())
-    yield number("gap_motion", "Smallest gap in motion", moving, "mm", digits=3, note=motion)
-    crossed = int(cloaked["overlaps"].sum())
-    yield number("overlaps_motion", "Overlaps in motion", crossed, note=motion)
-    void = float(np.degrees(cloaked["min_void_angle"].min()))
-    label, note = "Smallest void angle in motion", "cloaked, all load cases and times"
-    yield number("void_angle_motion", label, void, "deg", digits=3, note=note)
+    yield _told("gap_motion", float(cloaked["min_gap"].min()))
+    yield _told("overlaps_motion", int(cloaked["overlaps"].sum()))
+    yield _told("void_angle_motion", float(np.degrees(cloaked["min_void_angle"].min())))
     note = "relative, by step halving; the largest of all load cases"
     yield from checks.error_facts(response, note)

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from reports.base import Table, style
+from reports.base import Table, prose, style
 from reports.facts import Columns, Fact, history, measures, vertices
 from reports.figures.shielding.curves import loss_panel, map_panel, motion_panel
 from reports.figures.shielding.facts import MONITORED, monitored_recordings
@@ -40,6 +40,7 @@ TALLEST_SNAPSHOTS = 122.0
 
 SNAPSHOT = 40.0
 """Side of a snapshot in mm where there is room."""
+_PROSE = prose(__file__)
 
 
 def shielding_figure(study: StudyResults) -> PanelFigure:
@@ -77,33 +78,30 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
         Panel(
             ("a", "", 0.0, 0.8),
             lambda figure: _problem(figure, scene, design, direction),
-            "Reference, altered and cloaked structures; hatched pads clamp the corners, the arrow "
-            "is the drive, the dashed circle bounds the cloak.",
+            _PROSE["a"],
             [Table("design.csv", "vertices of the cloaked and of the initial design", shapes)],
         ),
         Panel(
             ("b", "Optimisation", 123.0, 0.8),
             loss,
-            "Loss against evaluation: mean over the load angles (thick) and each angle (thin); "
-            "rejected evaluations are dots, infeasible ones pale, circles the best feasible "
-            "designs.",
+            _PROSE["b"],
             [Table("loss_history.csv", "loss against evaluation (panel b)", history(design))],
         ),
         Panel(
             ("c", f"Response over one drive cycle, {load}", 0.0, top),
             lambda figure: snapshots_panel(figure, scene, rows, top + 8.5, height),
-            "Snapshots over the last drive cycle at true size, coloured by |U|.",
+            _PROSE["c"],
         ),
         Panel(
             ("d", f"Middle unit of the top edge, {load}", 0.0, low),
             motion,
-            "Vertical displacement of the middle unit of the top edge; dots mark the snapshots.",
+            _PROSE["d"],
             [Table("top_edge.csv", middle, _top_edge(scene, response))],
         ),
         Panel(
             ("e", most, 109.0, low),
             losses,
-            "Loss over loading angle and frequency; stars mark the loads designed for.",
+            _PROSE["e"],
             [Table("robustness.csv", over, _map(sweep))],
         ),
     ]
@@ -117,10 +115,7 @@ def shielding_text(study: StudyResults, caption: str, facts: Sequence[Fact]) -> 
         study,
         caption,
         facts,
-        credit=(
-            "After Figure 2 of Bordiga et al., “Nonlinear mechanical metamaterial cloaks”; every "
-            "number here is computed from the datasets."
-        ),
+        credit=_PROSE["credit"],
         figure_title="Shielding dynamic excitations",
         headline=("mean_reduction", "loss_end", "peak_to_peak_reduction", "map_max"),
         note="The dot marks the unit of panel d.",

@@ -98,8 +98,7 @@ def snapshot_times(scene: ReportScene, response: xr.Dataset) -> Floats:
     """Tells when the snapshots are, over the last whole drive cycle, s."""
     end = response["time"].values[-1]
     start = (np.floor(end * scene.frequency * measures.LAST_SAMPLE) - 1.0) * scene.period
-    wanted: Floats = start + np.array(PHASES) * scene.period
-    return wanted
+    return start + np.array(PHASES) * scene.period
 
 
 def simulated_rows(scene: ReportScene, response: xr.Dataset) -> list[SnapshotRow]:

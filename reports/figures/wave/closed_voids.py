@@ -83,7 +83,4 @@ def along_edges(problem: Problem, response: xr.Dataset) -> xr.DataArray:
 
 def edge_contacts(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     """Returns number (structure, case, time) of closed voids along the top and bottom edges."""
-    contacts: xr.DataArray = (along_edges(problem, response) < problem.contact.cutoff_angle).sum(
-        "ligament"
-    )
-    return contacts
+    return (along_edges(problem, response) < problem.contact.cutoff_angle).sum("ligament")

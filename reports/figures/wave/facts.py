@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem.sections import RampHarmonicDrive
-from reports.facts import Fact, checks, grouped, number, share, within, worded
+from reports.facts import Fact, checks, facts_of, grouped, within, worded
 from reports.figures.loading_path import (
     abscissa_of,
     loss_facts,
@@ -19,6 +19,8 @@ from reports.figures.loading_path import (
 from reports.figures.wave.closed_voids import edge_contacts
 from reports.figures.wave.monitored_places import places, relative_error
 from reports.study import StudyResults, display_name
+
+_told = facts_of(__file__)
 
 
 def wave_facts(study: StudyResults) -> list[Fact]:
@@ -41,9 +43,8 @@ def drive_facts(study: StudyResults) -> Iterator[Fact]:
     """Tells how the drive is switched on."""
     drive = study.problem.drive
     if isinstance(drive, RampHarmonicDrive):
-        note = "A (1 + tanh((t − delay)/rise))/2 sin(2πf (t − delay))"
-        yield number("delay", "Delay of the drive", 1e3 * drive.delay, "ms", note=note)
-        yield number("rise", "Rise time of the drive", 1e3 * drive.rise_time, "ms")
+        yield _told("delay", 1e3 * drive.delay)
+        yield _told("rise", 1e3 * drive.rise_time)
 
 
 def error_facts(study: StudyResults) -> Iterator[Fact]:
@@ -51,15 +52,11 @@ def error_facts(study: StudyResults) -> Iterator[Fact]:
     error = over_cases(study.problem, relative_error(study.problem, study.response))
     most = over_cases(study.problem, measures.measure_of(study.problem).of(study.response))
     for name in ("altered", "cloaked"):
-        words = display_name(study.problem, name).lower()
-        note = "L2 over the surroundings and the whole history, relative to the intact"
-        value = float(error.sel(structure=name))
-        yield number(f"error_{name}", f"Relative error, {words}", value, digits=3, note=note)
-        peak = float(most.sel(structure=name).max())
-        note = "distance to the intact over its largest size in time"
-        yield number(f"peak_{name}", f"Largest mimicking error, {words}", peak, digits=3, note=note)
+        of = {"name": name, "shown": display_name(study.problem, name).lower()}
+        yield _told("error_{name}", float(error.sel(structure=name)), **of)
+        yield _told("peak_{name}", float(most.sel(structure=name).max()), **of)
     gain = 1.0 - float(error.sel(structure="cloaked")) / float(error.sel(structure="altered"))
-    yield share("error_reduction", "Relative error reduced by", gain)
+    yield _told("error_reduction", gain)
 
 
 def sum_facts(study: StudyResults) -> Iterator[Fact]:
@@ -67,10 +64,9 @@ def sum_facts(study: StudyResults) -> Iterator[Fact]:
     count = study.problem.horizon.samples
     loss = over_cases(study.problem, study.response["loss_samples"])
     for name in ("altered", "cloaked"):
-        label = f"Loss as the authors sum it, {display_name(study.problem, name).lower()}"
-        note = f"over {count} samples: √{count} times the root of their mean square"
+        shown = display_name(study.problem, name).lower()
         value = float(np.sqrt(count)) * float(loss.sel(structure=name))
-        yield number(f"loss_sum_{name}", label, value, digits=3, note=note)
+        yield _told("loss_sum_{name}", value, name=name, shown=shown, count=count)
 
 
 def place_facts(study: StudyResults) -> Iterator[Fact]:
@@ -79,28 +75,21 @@ def place_facts(study: StudyResults) -> Iterator[Fact]:
     for k, place in enumerate(places(study.problem, study.response)):
         curves = rise.isel(unit=place.unit)
         intact = curves.sel(structure="intact")
+        most = worded(float(np.abs(intact).max()), "mm", 3)
         for name in ("altered", "cloaked"):
             apart = ((curves.sel(structure=name) - intact) ** 2).mean("time") ** 0.5
-            label = f"u_y, {place.name}, {display_name(study.problem, name).lower()}"
-            note = f"RMS distance to the intact, whose largest is {_largest(intact)}"
-            key = f"place_{k + 1}_{name}"
-            yield number(key, label, float(apart), "mm", digits=3, note=note)
-
-
-def _largest(series: xr.DataArray) -> str:
-    return worded(float(np.abs(series).max()), "mm", 3)
+            of = {"name": name, "shown": display_name(study.problem, name).lower()}
+            yield _told("place_{k}_{name}", float(apart), k=k + 1, place=place, most=most, **of)
 
 
 def edge_facts(study: StudyResults) -> Iterator[Fact]:
     """Yields closed voids along the top and bottom edges."""
     counts = over_cases(study.problem, edge_contacts(study.problem, study.response))
     for name in structures(study.response):
-        words = display_name(study.problem, name).lower()
         of_one = counts.sel(structure=name)
+        of = {"name": name, "shown": display_name(study.problem, name).lower()}
         time = 100.0 * float((of_one > 0).mean())
-        note = f"along the top and bottom edges; at least one in {time:.1f} % of the time"
-        label = f"Closed voids at once, {words}, most"
-        yield number(f"edge_contacts_{name}", label, int(of_one.max()), note=note)
+        yield _told("edge_contacts_{name}", int(of_one.max()), time=time, **of)
 
 
 def step_facts(verification: xr.Dataset | None) -> Iterator[Fact]:
@@ -109,19 +98,22 @@ def step_facts(verification: xr.Dataset | None) -> Iterator[Fact]:
         return
     for name in (str(name) for name in verification["check"].values):
         found = verification.sel(check=name)
-        key, status = name.replace(" ", "_"), str(found["status"].item())
+        status = str(found["status"].item())
         for structure in ("altered", "cloaked"):
             part = found.sel(structure=structure)
-            label = f"Loss, {structure}, {name}"
+            of = {"key": name.replace(" ", "_"), "structure": structure, "name": name}
             if status != "ok":
-                yield Fact(f"check_{key}_{structure}", label, np.nan, "1", "—", note=status)
+                yield _told("check_{key}_{structure}", np.nan, "—", note=status, **of)
                 continue
-            step = worded(1e6 * float(part["time_step"]), "µs", 4)
-            note = (
-                f"relative error {float(part['error']):.3g}; steps of {step}; "
-                f"{overlapping(int(part['overlaps']))}"
-            )
+            off = ""
             if (apart := float(part["departure"])) > 0.0:
-                note += f"; units {within(apart, 'mm', 2)} from the run at most"
-            value = float(part["loss"])
-            yield number(f"check_{key}_{structure}", label, value, digits=4, note=note)
+                off = f"; units {within(apart, 'mm', 2)} from the run at most"
+            yield _told(
+                "check_{key}_{structure}",
+                float(part["loss"]),
+                error=float(part["error"]),
+                step=worded(1e6 * float(part["time_step"]), "µs", 4),
+                overlaps=overlapping(int(part["overlaps"])),
+                off=off,
+                **of,
+            )

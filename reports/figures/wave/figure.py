@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reports.base import Table, style
+from reports.base import Table, prose, style
 from reports.facts import Columns
 from reports.figures.loading_path import (
     TALLEST_SNAPSHOTS,
@@ -33,6 +33,7 @@ CONTACT = "#e3342f"
 """Colour of marks: of contacts, and of places, as in the paper."""
 ROOM = 8.5
 """Between the letter of a row and its panels, mm."""
+_PROSE = prose(__file__)
 
 
 def wave_figure(study: StudyResults) -> PanelFigure:
@@ -42,45 +43,36 @@ def wave_figure(study: StudyResults) -> PanelFigure:
     top = 52.0
     middle = top + ROOM + grid.lines * grid.side + 1.5
     low = middle + 44.0
-    steps = study.verification
-    lattices = (
-        "The structures at rest: orange units are driven along the arrows, purple ones are "
-        "redesigned; red marks are the places of panel d."
-    )
 
     def error(figure: Figure) -> None:
         axes = style.place(figure, 11.0, low + ROOM, half - 14.0, 27.0)
         measure_panel(axes, study, path, measures.measure_of(study.problem))
 
     panels = [
-        *design_panels(study, r"Loss $J$", lattices, partial(_mark_places, study)),
+        *design_panels(study, r"Loss $J$", _PROSE["a"], partial(_mark_places, study)),
         Panel(
             ("c", "Response, true to scale; red dots: closed voids", 0.0, top),
             lambda figure: snapshots(figure, study, grid, top + ROOM, partial(_contacts, study)),
-            "Snapshots at true size, coloured by u<sub>y</sub>; red dots are ligaments beside "
-            "which a void is closed to contact.",
+            _PROSE["c"],
         ),
         Panel(
             ("d", "Vertical displacement where marked in a", 0.0, middle),
             lambda figure: _places(figure, study, middle + ROOM),
-            "Vertical displacement of the marked units.",
+            _PROSE["d"],
             [Table("waves.csv", "every structure over time (panels d to f)", _over_time(study))],
         ),
         Panel(
             ("e", "Mimicking error", 0.0, low),
             error,
-            "Distance of the surroundings' motion to the intact one, over the largest size of "
-            "that in time.",
+            _PROSE["e"],
         ),
         Panel(
             ("f", "Smallest void angle along the top and bottom edges", half, low),
             lambda figure: _edges(
                 style.place(figure, half + 11.0, low + ROOM, half - 14.0, 27.0), study
             ),
-            "Smallest void angle along the top and bottom edges; in the red band the units touch.",
-            [Table("steps.csv", "loss and error with shorter steps", _steps(steps))]
-            if steps is not None
-            else [],
+            _PROSE["f"],
+            _steps(study.verification),
         ),
     ]
     remark = measured_overlay.caption(study.recordings)
@@ -113,10 +105,8 @@ def _contacts(study: StudyResults, axes: Axes, row: SnapshotStructure, sample: i
 def _places(figure: Figure, study: StudyResults, top: float) -> None:
     """Draws u_y over time at each place, side by side."""
     shown = places(study.problem, study.response)
-    path, rise = (
-        abscissa_of(study.problem, study.response),
-        study.response["displacement"].sel(dof="uy"),
-    )
+    path = abscissa_of(study.problem, study.response)
+    rise = study.response["displacement"].sel(dof="uy")
     width = style.TWO_COLUMNS / max(len(shown), 1)
     for k, place in enumerate(shown):
         axes = style.place(figure, k * width + 11.0, top, width - 14.0, 25.0)
@@ -132,12 +122,10 @@ def _places(figure: Figure, study: StudyResults, top: float) -> None:
 
 def _edges(axes: Axes, study: StudyResults) -> None:
     """Draws smallest void angle on the edges over time, and when that is contact."""
-    path_axes(axes, abscissa_of(study.problem, study.response), "angle (°)")
+    path = abscissa_of(study.problem, study.response)
+    path_axes(axes, path, "angle (°)")
     angles = 180.0 / np.pi * closed_voids.along_edges(study.problem, study.response).min("ligament")
-    structure_curves(
-        axes, study.problem, abscissa_of(study.problem, study.response), angles,
-        structures(study.response),
-    )  # fmt: skip
+    structure_curves(axes, study.problem, path, angles, structures(study.response))
     contact = study.problem.contact
     cutoff, barrier = np.degrees([contact.cutoff_angle, contact.barrier_angle])
     axes.axhspan(barrier, cutoff, color=CONTACT, alpha=0.18, lw=0, zorder=1)
@@ -166,11 +154,13 @@ def _over_time(study: StudyResults) -> Columns:
     return {"time_s": response["time"].values} | by_structure(study, series)
 
 
-def _steps(verification: xr.Dataset) -> Columns:
+def _steps(verification: xr.Dataset | None) -> list[Table]:
     """Returns one row a check and structure."""
+    if verification is None:
+        return []
     checks, names = verification["check"].values, verification["structure"].values
     check, structure = np.meshgrid(checks, names, indexing="ij")
     columns: Columns = {"check": check.ravel(), "structure": structure.ravel()}
     for field in ("time_step", "loss", "error", "departure", "min_void_angle", "gap", "overlaps"):
         columns[field] = verification[field].values.ravel()
-    return columns
+    return [Table("steps.csv", "loss and error with shorter steps", columns)]

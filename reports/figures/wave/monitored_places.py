@@ -46,5 +46,4 @@ def relative_error(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     intact = inside.sel(structure="intact")
     missed = squares(inside - intact, scale).sum("unit").integrate("time")
     size = squares(intact, scale).sum("unit").integrate("time")
-    error: xr.DataArray = (missed / size) ** 0.5
-    return error
+    return (missed / size) ** 0.5

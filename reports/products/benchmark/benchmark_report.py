@@ -20,20 +20,14 @@ _PROSE = prose(__file__)
 
 
 class BenchmarkSection(NamedTuple):
-    """Holds a picture of the page.
+    """Holds a picture of the page."""
 
-    Attributes:
-        name: of its files.
-        title, caption: what it shows.
-        draw: makes it.
-        shown: the datasets that it shows, by the names of their files.
-    """
-
-    name: str
+    name: str  # of its files
+    # title, caption: what it shows
     title: str
     caption: str
-    draw: Callable[[], Figure]
-    shown: Mapping[str, xr.Dataset]
+    draw: Callable[[], Figure]  # makes it
+    shown: Mapping[str, xr.Dataset]  # the datasets that it shows, by the names of their files
 
 
 def report(args: argparse.Namespace) -> None:

@@ -99,8 +99,7 @@ def _draw(body: Body, view: View, depth: AnyFloats, face: Integers, drawn: int) 
         place = (row[order], column[order])
         depth[place] = height[order]
         face[place] = which[order] + drawn
-    normals: AnyFloats = across[facing] / length[facing, None]
-    return normals
+    return across[facing] / length[facing, None]
 
 
 def _covered(
@@ -149,8 +148,7 @@ def _inside(
 
 
 def _cross(a: AnyFloats, b: AnyFloats) -> AnyFloats:
-    found: AnyFloats = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return found
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 def _shaded(depth: AnyFloats, face: Integers, normals: AnyFloats, colours: AnyFloats) -> AnyFloats:

@@ -107,8 +107,7 @@ def _motion(cell: MovieCell, samples: Floats, at: float) -> Floats:
     motion = cell.clip.motion[cell.case]
     place = float(np.interp(at, samples, np.arange(len(samples))))
     low = min(int(place), len(samples) - 2)
-    between: Floats = motion[low] + (place - low) * (motion[low + 1] - motion[low])
-    return between
+    return motion[low] + (place - low) * (motion[low + 1] - motion[low])
 
 
 def _colours(field: ColourField, motion: Floats) -> NDArray[np.uint8]:

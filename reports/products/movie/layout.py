@@ -34,23 +34,14 @@ class MovieCell(NamedTuple):
 
 @dataclass(frozen=True)
 class MovieLayout:
-    """Describes the cells, and how millimetres become pixels in them.
+    """Describes the cells, and how millimetres become pixels in them."""
 
-    Attributes:
-        cells: what moves.
-        shape: rows and columns.
-        pixels: size of a cell.
-        scale: pixels per mm.
-        corner: (2,) lowest x and highest y that a cell shows, mm.
-        above: room between a cell's top and its structure, pixels.
-    """
-
-    cells: list[MovieCell]
-    shape: tuple[int, int]
-    pixels: tuple[float, float]
-    scale: float
-    corner: NDArray[np.float64]
-    above: float
+    cells: list[MovieCell]  # what moves
+    shape: tuple[int, int]  # rows and columns
+    pixels: tuple[float, float]  # size of a cell
+    scale: float  # pixels per mm
+    corner: NDArray[np.float64]  # (2,) lowest x and highest y that a cell shows, mm
+    above: float  # room between a cell's top and its structure, pixels
 
     def origin(self, cell: MovieCell) -> NDArray[np.float64]:
         """Tells where a cell's corner lies in the frame (x, y), pixels."""

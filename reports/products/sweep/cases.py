@@ -12,17 +12,11 @@ from sim.core import Floats
 
 @dataclass(frozen=True)
 class SweepAxis:
-    """Describes a parameter of a sweep.
+    """Describes a parameter of a sweep."""
 
-    Attributes:
-        label: its keys and unit.
-        places: (case) its values; those of words are their numbers in `words`.
-        words: the values, where they are no numbers.
-    """
-
-    label: str
-    places: Floats
-    words: tuple[str, ...] = ()
+    label: str  # its keys and unit
+    places: Floats  # (case) its values; those of words are their numbers in `words`
+    words: tuple[str, ...] = ()  # the values, where they are no numbers
 
     @property
     def distinct(self) -> Floats:

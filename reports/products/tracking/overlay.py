@@ -32,29 +32,17 @@ _LOST = tuple(round(255 * part) for part in to_rgb(style.ALTERED))
 
 
 class Painter(NamedTuple):
-    """Draws a track on the frames of its video.
+    """Draws a track on the frames of its video."""
 
-    Attributes:
-        specimen: the units that are present.
-        camera: of the track.
-        pose: (frames, units, 3), NaN where lost.
-        values: (frames, units) what the colours show.
-        colours: (256, 3) of the colour map.
-        limits: values at its ends.
-        label: what the colours show, with its unit.
-        note: words at the right end of the band.
-        scale: how much larger the picture is drawn.
-    """
-
-    specimen: SpecimenOutlines
-    camera: Camera
-    pose: Floats
-    values: Floats
-    colours: NDArray[np.uint8]
-    limits: tuple[float, float]
-    label: str
-    note: str
-    scale: int
+    specimen: SpecimenOutlines  # the units that are present
+    camera: Camera  # of the track
+    pose: Floats  # (frames, units, 3), NaN where lost
+    values: Floats  # (frames, units) what the colours show
+    colours: NDArray[np.uint8]  # (256, 3) of the colour map
+    limits: tuple[float, float]  # values at its ends
+    label: str  # what the colours show, with its unit
+    note: str  # words at the right end of the band
+    scale: int  # how much larger the picture is drawn
 
 
 def painter(track: xr.Dataset, shown: str) -> Painter:

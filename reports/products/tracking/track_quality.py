@@ -24,19 +24,12 @@ _WHITE = 234
 
 
 class ExposureStatistics(NamedTuple):
-    """Describes the brightness of some frames.
+    """Describes the brightness of some frames."""
 
-    Attributes:
-        bright: the 99th percentile, of the range.
-        dark: the first percentile, of the range.
-        clipped: part of the pixels at the end of the range.
-        flicker: standard deviation of the mean brightness over the frames, relative.
-    """
-
-    bright: float
-    dark: float
-    clipped: float
-    flicker: float
+    bright: float  # the 99th percentile, of the range
+    dark: float  # the first percentile, of the range
+    clipped: float  # part of the pixels at the end of the range
+    flicker: float  # standard deviation of the mean brightness over the frames, relative
 
 
 class StreamProperties(NamedTuple):
@@ -47,40 +40,24 @@ class StreamProperties(NamedTuple):
 
 
 class TrackQuality(NamedTuple):
-    """Describes everything that page and advice are made of.
+    """Describes everything that page and advice are made of."""
 
-    Attributes:
-        pixel: size in the specimen's plane, mm.
-        pitch: distance of joined units as seen, px.
-        blur: standard deviation of the blur at edges, px.
-        sigma: (3,) median stated uncertainty: x, y in px, rotation in deg.
-        resting: number of frames at rest in the beginning.
-        floor: (3,) scatter over these, likewise; NaN if there are too few.
-        lost: (frames, reasons) part of the units that are missing, by reason.
-        reasons: their names.
-        duplicates, dropped: numbers of the frames.
-        fastest: largest step of a unit from frame to frame, px.
-        irregular: spread of the frames' intervals, relative to their median.
-        residual: root mean square of the first frame's residuals, px.
-        light: of the video.
-        stream: of the video.
-    """
-
-    pixel: float
-    pitch: float
-    blur: float
-    sigma: Floats
-    resting: int
-    floor: Floats
-    lost: Floats
-    reasons: tuple[str, ...]
+    pixel: float  # size in the specimen's plane, mm
+    pitch: float  # distance of joined units as seen, px
+    blur: float  # standard deviation of the blur at edges, px
+    sigma: Floats  # (3,) median stated uncertainty: x, y in px, rotation in deg
+    resting: int  # number of frames at rest in the beginning
+    floor: Floats  # (3,) scatter over these, likewise; NaN if there are too few
+    lost: Floats  # (frames, reasons) part of the units that are missing, by reason
+    reasons: tuple[str, ...]  # their names
+    # duplicates, dropped: numbers of the frames
     duplicates: list[int]
     dropped: list[int]
-    fastest: float
-    irregular: float
-    residual: float
-    light: ExposureStatistics
-    stream: StreamProperties
+    fastest: float  # largest step of a unit from frame to frame, px
+    irregular: float  # spread of the frames' intervals, relative to their median
+    residual: float  # root mean square of the first frame's residuals, px
+    light: ExposureStatistics  # of the video
+    stream: StreamProperties  # of the video
 
 
 def measured(track: xr.Dataset, images: Iterable[Image], stream: StreamProperties) -> TrackQuality:
