@@ -21,17 +21,12 @@ NAN = float("nan")
 
 
 class Sample(NamedTuple):
-    """Holds the results of one run of a method.
+    """Holds the results of one run of a method."""
 
-    Attributes:
-        values: results by name. Each is compared with the reference's result of the same name; in
-            the table it stands in the column named by what comes before "@" ("loss@45 deg" under
-            "loss").
-        work: counts of what was done (steps, force evaluations, factorisations).
-    """
-
+    # results by name. Each is compared with the reference's result of the same name; in the table
+    # it stands in the column named by what comes before "@" ("loss@45 deg" under "loss").
     values: Mapping[str, Floats]
-    work: Mapping[str, int]
+    work: Mapping[str, int]  # counts of what was done (steps, force evaluations, factorisations)
 
 
 Run = Callable[[], Sample]
@@ -39,65 +34,46 @@ Run = Callable[[], Sample]
 
 @dataclass(frozen=True)
 class Method:
-    """Names one way to compute a suite's result, and its settings.
+    """Names one way to compute a suite's result, and its settings."""
 
-    Attributes:
-        name: as the table shows it.
-        prepare: builds and compiles; the run that it returns is what is timed. It is sent to a
-            process of its own: a function of a module, or a ``functools.partial`` of one. It takes
-            the value of a setting and the task, or nothing where there are no settings.
-        settings: from loose to tight, by name and value.
-        own: whether it is one of ours.
-        tasks: what it can do.
-        repeats: at most so many timed runs; None for as many as asked for.
-        share: part of the whole job that a run does; times are divided by it (one of four load
-            cases: 0.25).
-        timed: False for stored numbers, which are compared with the reference and nothing else.
-        baseline: whether its last stored figures may stand in for a new measurement.
-        note: what a reader of the table must know.
-    """
-
-    name: str
+    name: str  # as the table shows it
+    # builds and compiles; the run that it returns is what is timed. It is sent to a process of its
+    # own: a function of a module, or a ``functools.partial`` of one. It takes the value of a
+    # setting and the task, or nothing where there are no settings.
     prepare: Callable[..., Run]
-    settings: tuple[tuple[str, float], ...] = ()
-    own: bool = True
-    tasks: tuple[Task, ...] = ("loss", "gradient")
-    repeats: int | None = None
+    settings: tuple[tuple[str, float], ...] = ()  # from loose to tight, by name and value
+    own: bool = True  # whether it is one of ours
+    tasks: tuple[Task, ...] = ("loss", "gradient")  # what it can do
+    repeats: int | None = None  # at most so many timed runs; None for as many as asked for
+    # part of the whole job that a run does; times are divided by it (one of four load cases: 0.25)
     share: float = 1.0
+    # False for stored numbers, which are compared with the reference and nothing else
     timed: bool = True
-    baseline: bool = False
-    note: str = ""
+    baseline: bool = False  # whether its last stored figures may stand in for a new measurement
+    note: str = ""  # what a reader of the table must know
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """Holds the figures of a method at a setting.
+    """Holds the figures of a method at a setting."""
 
-    Attributes:
-        method, setting, task, own, note: as in the method.
-        units: of the lattice.
-        compile_s: wall time to build, compile and warm up, s.
-        cpu_s: processor time of each run over the share of the job that it did, s.
-        wall_s: the same by the clock, s; longer on a machine that others use too.
-        errors: relative error of each value by its name.
-        work: counts, of what one run did.
-        peak_mib: peak resident memory of the process, MiB.
-        failure: why it has no figures, or empty.
-    """
-
+    # method, setting, task, own, note: as in the method
     method: str
     setting: str = ""
     task: Task = "gradient"
     own: bool = True
     note: str = ""
-    units: int = 0
-    compile_s: float = NAN
+    units: int = 0  # of the lattice
+    compile_s: float = NAN  # wall time to build, compile and warm up, s
+    # processor time of each run over the share of the job that it did, s
     cpu_s: tuple[float, ...] = ()
+    # the same by the clock, s; longer on a machine that others use too
     wall_s: tuple[float, ...] = ()
+    # relative error of each value by its name
     errors: Mapping[str, float] = field(default_factory=dict)
-    work: Mapping[str, int] = field(default_factory=dict)
-    peak_mib: float = NAN
-    failure: str = ""
+    work: Mapping[str, int] = field(default_factory=dict)  # counts, of what one run did
+    peak_mib: float = NAN  # peak resident memory of the process, MiB
+    failure: str = ""  # why it has no figures, or empty
 
     @property
     def name(self) -> str:
@@ -128,21 +104,16 @@ Measured = Mapping[str, Measurement]
 
 @dataclass(frozen=True)
 class Target:
-    """Sets a limit to a number that is computed from measurements.
+    """Sets a limit to a number that is computed from measurements."""
 
-    Attributes:
-        name, unit: as shown.
-        value: the number; nan where something was not measured.
-        at_most, at_least: what it must keep to; one of the two.
-        aim: what is hoped for.
-    """
-
+    # name, unit: as shown
     name: str
-    value: Callable[[Measured], float]
+    value: Callable[[Measured], float]  # the number; nan where something was not measured
     unit: str = ""
+    # at_most, at_least: what it must keep to; one of the two
     at_most: float | None = None
     at_least: float | None = None
-    aim: float | None = None
+    aim: float | None = None  # what is hoped for
 
     def verdict(self, measured: Measured) -> tuple[float, str]:
         """Returns the number and "met", "missed" or "not measured"."""
@@ -156,46 +127,29 @@ class Target:
 
 @dataclass(frozen=True)
 class MeasuringLimits:
-    """Bounds the time that measurements take.
+    """Bounds the time that measurements take."""
 
-    Attributes:
-        repeats: runs of a point or rounds of a suite, fewer if they are long.
-        limit_s: processor time that preparing or one run of a setting may take, s.
-        skipped: methods that are not measured now.
-        stored: older figures of these, if there are any.
-    """
-
-    repeats: int = 5
-    limit_s: float = 90.0
-    skipped: tuple[str, ...] = ()
-    stored: Measured = field(default_factory=dict)
+    repeats: int = 5  # runs of a point or rounds of a suite, fewer if they are long
+    limit_s: float = 90.0  # processor time that preparing or one run of a setting may take, s
+    skipped: tuple[str, ...] = ()  # methods that are not measured now
+    stored: Measured = field(default_factory=dict)  # older figures of these, if there are any
 
 
 @dataclass(frozen=True)
 class Suite:
-    """Groups what is measured together.
+    """Groups what is measured together."""
 
-    Attributes:
-        name: of the suite; its dataset bears it.
-        subject: what one run computes.
-        reference: what errors are measured against.
-        measure: gives the measurements, or a dataset without its attributes.
-        kind: of the dataset.
-        targets: to be met.
-        in_turn: whether its methods run in turn on one core, and are compared with stored times.
-        short: whether it belongs to the short benchmark.
-        baselines: methods whose stored figures may stand in for new ones.
-    """
-
-    name: str
-    subject: str
-    reference: str
+    name: str  # of the suite; its dataset bears it
+    subject: str  # what one run computes
+    reference: str  # what errors are measured against
+    # gives the measurements, or a dataset without its attributes
     measure: Callable[[MeasuringLimits, Tell], list[Measurement] | xr.Dataset]
-    kind: Kind = "benchmark"
-    targets: tuple[Target, ...] = ()
+    kind: Kind = "benchmark"  # of the dataset
+    targets: tuple[Target, ...] = ()  # to be met
+    # whether its methods run in turn on one core, and are compared with stored times
     in_turn: bool = False
-    short: bool = False
-    baselines: tuple[str, ...] = ()
+    short: bool = False  # whether it belongs to the short benchmark
+    baselines: tuple[str, ...] = ()  # methods whose stored figures may stand in for new ones
 
     def verdicts(self, measurements: list[Measurement]) -> Iterator[tuple[Target, float, str]]:
         """Yields every target with its number and verdict."""

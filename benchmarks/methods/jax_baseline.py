@@ -29,20 +29,15 @@ Loss = Callable[[Array], tuple[Array, dict[str, Array]]]
 
 @dataclass(frozen=True)
 class RungeKutta:
-    """Sets the baseline.
+    """Sets the baseline."""
 
-    Attributes:
-        rtol, atol: tolerances of a step, relative and absolute (mm, mm/s, rad, rad/s alike).
-        max_steps: bound on the steps; the adjoint keeps about its square root in checkpoints.
-        solver: name of a method of diffrax.
-        adjoint: of diffrax, for the gradient.
-    """
-
+    # rtol, atol: tolerances of a step, relative and absolute (mm, mm/s, rad, rad/s alike)
     rtol: float | Array = 1e-8
     atol: float | Array = 1e-4
+    # bound on the steps; the adjoint keeps about its square root in checkpoints
     max_steps: int = 2**17
-    solver: str = "Dopri5"
-    adjoint: str = "RecursiveCheckpointAdjoint"
+    solver: str = "Dopri5"  # name of a method of diffrax
+    adjoint: str = "RecursiveCheckpointAdjoint"  # of diffrax, for the gradient
 
 
 def force(scene: Scene) -> Force:

@@ -47,15 +47,10 @@ TITLES = {
 
 @dataclass(frozen=True)
 class LoadCase:
-    """Holds a scene with its objective.
+    """Holds a scene with its objective."""
 
-    Attributes:
-        scene: with one load case.
-        target: (1, n_times, n_region, 3) motion to mimic, if there is one.
-    """
-
-    scene: Scene
-    target: Floats | None
+    scene: Scene  # with one load case
+    target: Floats | None  # (1, n_times, n_region, 3) motion to mimic, if there is one
 
     @cached_property
     def times(self) -> Floats:

@@ -37,22 +37,14 @@ SLOWLY = 20.0
 
 @dataclass(frozen=True)
 class Skip:
-    """Names something that a plan leaves out.
+    """Names something that a plan leaves out."""
 
-    Attributes:
-        name: what.
-        prepare: for a scene's name, and whether it is skipped.
-        wave: whether it stands on the scene in time, or on the static one.
-        tolerance: relative change of the results that it may make.
-        why: why it may be left out.
-        repeats: at most so many runs; the first one alone if that is what is measured.
-    """
-
-    name: str
-    prepare: Callable[[str, float, Task], Run]
-    wave: bool
-    tolerance: float
-    why: str
+    name: str  # what
+    prepare: Callable[[str, float, Task], Run]  # for a scene's name, and whether it is skipped
+    wave: bool  # whether it stands on the scene in time, or on the static one
+    tolerance: float  # relative change of the results that it may make
+    why: str  # why it may be left out
+    # at most so many runs; the first one alone if that is what is measured
     repeats: int | None = None
 
 

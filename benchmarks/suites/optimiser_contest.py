@@ -33,21 +33,16 @@ class BudgetSpentError(Exception):
 
 @dataclass
 class BudgetedProblem:
-    """Counts the evaluations of a problem.
+    """Counts the evaluations of a problem."""
 
-    Attributes:
-        evaluate: loss, gradient and more of a design.
-        constraints: values >= 0 and Jacobian of a design.
-        n_variables: of the design.
-        evaluations, seconds: that may be used.
-        designs, losses, clock: of every evaluation; NaN where it failed.
-    """
-
+    # loss, gradient and more of a design
     evaluate: Callable[[Floats], tuple[float, Floats, Floats]]
-    constraints: ConstraintVector
-    n_variables: int
+    constraints: ConstraintVector  # values >= 0 and Jacobian of a design
+    n_variables: int  # of the design
+    # evaluations, seconds: that may be used
     evaluations: int
     seconds: float
+    # designs, losses, clock: of every evaluation; NaN where it failed
     designs: list[Floats] = field(default_factory=list)
     losses: list[float] = field(default_factory=list)
     clock: list[float] = field(default_factory=list)
@@ -86,20 +81,16 @@ class BudgetedProblem:
 
 
 class OptimiserHistory(NamedTuple):
-    """Holds the history of an optimiser, evaluation by evaluation.
+    """Holds the history of an optimiser, evaluation by evaluation."""
 
-    Attributes:
-        loss, violation, clock: as evaluated: loss, mm, s of processor time since the start.
-        best, residual: loss of the best feasible design so far, and its KKT residual (mm).
-        final: loss of the best feasible design, evaluated afresh.
-    """
-
+    # loss, violation, clock: as evaluated: loss, mm, s of processor time since the start
     loss: Floats
     violation: Floats
     clock: Floats
+    # best, residual: loss of the best feasible design so far, and its KKT residual (mm)
     best: Floats
     residual: Floats
-    final: Floats
+    final: Floats  # loss of the best feasible design, evaluated afresh
 
 
 def judged(

@@ -29,26 +29,17 @@ _GROSS = (0.3, 0.3, np.deg2rad(3))
 
 
 class TruthVideo(NamedTuple):
-    """Holds a video with its truth.
+    """Holds a video with its truth."""
 
-    Attributes:
-        name, rate: of the video, Hz.
-        frames: all of them.
-        specimen: what it shows.
-        scale: px/mm, roughly.
-        truth: (n_frames, n_units, 3) displacement, mm and rad.
-        visible: (n_frames, n_units) units that are to be seen.
-        fault: (n_frames,) whether frames before are missing, or the one before is shown again.
-    """
-
+    # name, rate: of the video, Hz
     name: str
     rate: float
-    frames: list[Frame]
-    specimen: SpecimenOutlines
-    scale: float
-    truth: Floats
-    visible: Mask
-    fault: Mask
+    frames: list[Frame]  # all of them
+    specimen: SpecimenOutlines  # what it shows
+    scale: float  # px/mm, roughly
+    truth: Floats  # (n_frames, n_units, 3) displacement, mm and rad
+    visible: Mask  # (n_frames, n_units) units that are to be seen
+    fault: Mask  # (n_frames,) whether frames before are missing, or the one before is shown again
 
 
 def measure(folder: Path, limits: MeasuringLimits, tell: Tell) -> xr.Dataset:

@@ -34,19 +34,12 @@ _HALF, _STEP = 20, 4
 
 
 class KnownPatch(NamedTuple):
-    """Holds a patch, and how it moved.
+    """Holds a patch, and how it moved."""
 
-    Attributes:
-        group: of patches, which a line of the table tells of.
-        patch: the patch.
-        motion: (3,) px and rad, as `find_motion` has them.
-        whole: whether it is fitted to its very edge.
-    """
-
-    group: str
-    patch: Patch
-    motion: Floats
-    whole: bool = False
+    group: str  # of patches, which a line of the table tells of
+    patch: Patch  # the patch
+    motion: Floats  # (3,) px and rad, as `find_motion` has them
+    whole: bool = False  # whether it is fitted to its very edge
 
 
 def patches(folder: Path = IMAGES, pictures: Path = PICTURES) -> Iterator[KnownPatch]:

@@ -29,30 +29,21 @@ Covering: TypeAlias = Callable[[Singles, float], None]
 
 
 class View(NamedTuple):
-    """Holds a camera and its light.
+    """Holds a camera and its light."""
 
-    Attributes:
-        size: columns and rows.
-        scale: px/mm on the axis.
-        distance: from the specimen, mm; lines of sight are parallel without it.
-        tilt: about x, rad.
-        fisheye: whether the angle to the axis, not its tangent, maps to the radius.
-        blur: standard deviation of the optics, px.
-        exposure, readout: of a frame, and from its first row to its last, s.
-        dark, light: shades of units and board.
-        noise: standard deviation of the sensor at each brightness: of nothing, and its root's.
-    """
-
-    size: tuple[int, int] = (640, 640)
-    scale: float = 4.0
-    distance: float = 900.0
-    tilt: float = 0.02
-    fisheye: bool = False
-    blur: float = 0.7
+    size: tuple[int, int] = (640, 640)  # columns and rows
+    scale: float = 4.0  # px/mm on the axis
+    distance: float = 900.0  # from the specimen, mm; lines of sight are parallel without it
+    tilt: float = 0.02  # about x, rad
+    fisheye: bool = False  # whether the angle to the axis, not its tangent, maps to the radius
+    blur: float = 0.7  # standard deviation of the optics, px
+    # exposure, readout: of a frame, and from its first row to its last, s
     exposure: float = 0.0
     readout: float = 0.0
+    # dark, light: shades of units and board
     dark: float = 30.0
     light: float = 205.0
+    # standard deviation of the sensor at each brightness: of nothing, and its root's
     noise: tuple[float, float] = (2.0, 0.12)
 
     def variance(self, brightness: Floats) -> Floats:

@@ -26,48 +26,28 @@ _TEAL, _RED = (150.0, 140.0, 30.0), (45.0, 68.0, 220.0)  # blue, green, red
 
 
 class WildClip(NamedTuple):
-    """Holds a clip and what is true of it.
+    """Holds a clip and what is true of it."""
 
-    Attributes:
-        frames: all of them.
-        specimen: what they show.
-        scale: px/mm, roughly.
-        truth: (frames, units, 3) displacement at the frames' times, mm and rad.
-        visible: (frames, units) units that are whole in view.
-        fault: (frames,) whether frames before are missing, or the one before is shown again.
-        keys: of the recording, that tell of camera and shutter.
-        held: (units,) which are clamped.
-    """
-
-    frames: list[Frame]
-    specimen: SpecimenOutlines
-    scale: float
-    truth: Floats
-    visible: Mask
-    fault: Mask
-    keys: Mapping[str, Any]
-    held: Mask
+    frames: list[Frame]  # all of them
+    specimen: SpecimenOutlines  # what they show
+    scale: float  # px/mm, roughly
+    truth: Floats  # (frames, units, 3) displacement at the frames' times, mm and rad
+    visible: Mask  # (frames, units) units that are whole in view
+    fault: Mask  # (frames,) whether frames before are missing, or the one before is shown again
+    keys: Mapping[str, Any]  # of the recording, that tell of camera and shutter
+    held: Mask  # (units,) which are clamped
 
 
 class Errors(NamedTuple):
-    """Holds the errors of a track.
+    """Holds the errors of a track."""
 
-    Attributes:
-        rms: of places that are wholly in view, px.
-        turn: likewise of rotations, deg.
-        gross: number of poses that are called good and are wrong.
-        good: number of those that are called good.
-        lost: part of what is wholly in view that is missing.
-        honesty: (3,) root mean square of error over sigma.
-        found, false: faults of timing.
-    """
-
-    rms: float
-    turn: float
-    gross: int
-    good: int
-    lost: float
-    honesty: Floats
+    rms: float  # of places that are wholly in view, px
+    turn: float  # likewise of rotations, deg
+    gross: int  # number of poses that are called good and are wrong
+    good: int  # number of those that are called good
+    lost: float  # part of what is wholly in view that is missing
+    honesty: Floats  # (3,) root mean square of error over sigma
+    # found, false: faults of timing
     found: int
     false: int
 

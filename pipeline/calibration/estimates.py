@@ -22,30 +22,20 @@ DERIVED: tuple[ConstantName, ...] = ("damping_translation", "damping_rotation")
 
 
 class Estimate(NamedTuple):
-    """Holds values of the constants, the wanted ones before those that follow from them.
+    """Holds values of the constants, the wanted ones before those that follow from them."""
 
-    Attributes:
-        names: of the constants.
-        wanted: how many of them were fitted.
-        value: (n,) in working units.
-        error: (n,) standard errors of their logarithms.
-        bound: (n,) of Cramer and Rao, of the standard errors.
-        low, high: (n,) ends of the 95 % intervals.
-        covariance: (n, n) of the logarithms.
-        status: (n,) how well each is determined.
-        condition: ratio of the longest to the shortest axis of the wanted constants' ellipsoid,
-            each counted in its own standard errors.
-    """
-
-    names: tuple[ConstantName, ...]
-    wanted: int
-    value: Floats
-    error: Floats
-    bound: Floats
+    names: tuple[ConstantName, ...]  # of the constants
+    wanted: int  # how many of them were fitted
+    value: Floats  # (n,) in working units
+    error: Floats  # (n,) standard errors of their logarithms
+    bound: Floats  # (n,) of Cramer and Rao, of the standard errors
+    # low, high: (n,) ends of the 95 % intervals
     low: Floats
     high: Floats
-    covariance: Floats
-    status: Ints
+    covariance: Floats  # (n, n) of the logarithms
+    status: Ints  # (n,) how well each is determined
+    # ratio of the longest to the shortest axis of the wanted constants' ellipsoid, each counted in
+    # its own standard errors
     condition: float
 
     @property
@@ -55,20 +45,14 @@ class Estimate(NamedTuple):
 
 
 class Quality(NamedTuple):
-    """Measures how well the fit explains each set.
+    """Measures how well the fit explains each set."""
 
-    Attributes:
-        points, freedom: (n_sets,) measured values, and what the fit leaves of their freedom.
-        chi_square: (n_sets,) sum of squares in units of the stated, or the estimated, noise.
-        level: (n_sets,) estimated factor on the stated noise; 1 where the noise is known.
-        autocorrelation: (n_sets,) of whitened residuals that follow one another in a course.
-    """
-
+    # points, freedom: (n_sets,) measured values, and what the fit leaves of their freedom
     points: Ints
     freedom: Floats
-    chi_square: Floats
-    level: Floats
-    autocorrelation: Floats
+    chi_square: Floats  # (n_sets,) sum of squares in units of the stated, or the estimated, noise
+    level: Floats  # (n_sets,) estimated factor on the stated noise; 1 where the noise is known
+    autocorrelation: Floats  # (n_sets,) of whitened residuals that follow one another in a course
 
 
 def estimate_constants(fit: Fit, known: Uncertainty) -> Estimate:

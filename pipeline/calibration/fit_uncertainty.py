@@ -18,18 +18,14 @@ _LEAST = 0.1
 
 
 class Uncertainty(NamedTuple):
-    """Holds errors of the wanted constants' logarithms.
+    """Holds errors of the wanted constants' logarithms."""
 
-    Attributes:
-        covariance: (n_names, n_names).
-        least: (n_names, n_names), the inverse of the information: the Cramer-Rao bound of the
-            covariance, at the stated, or estimated, noise.
-        newton: largest step that Newton's method would still take by the adjoint's gradient, in
-            standard errors; how far the solution is from the least sum of squares.
-    """
-
-    covariance: Floats
+    covariance: Floats  # (n_names, n_names)
+    # (n_names, n_names), the inverse of the information: the Cramer-Rao bound of the covariance, at
+    # the stated, or estimated, noise
     least: Floats
+    # largest step that Newton's method would still take by the adjoint's gradient, in standard
+    # errors; how far the solution is from the least sum of squares
     newton: float
 
 

@@ -27,17 +27,11 @@ ROUNDS = 6
 
 
 class FitModel(NamedTuple):
-    """Combines the wanted constants with all sets.
+    """Combines the wanted constants with all sets."""
 
-    Attributes:
-        begin: constants to start from.
-        names: the wanted ones.
-        experiments: all sets.
-    """
-
-    begin: Constants
-    names: tuple[ConstantName, ...]
-    experiments: Sequence[Experiment]
+    begin: Constants  # constants to start from
+    names: tuple[ConstantName, ...]  # the wanted ones
+    experiments: Sequence[Experiment]  # all sets
 
     @property
     def start(self) -> Floats:
@@ -105,23 +99,14 @@ class FitModel(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """Holds the solution, each set's rows already divided by the level of its noise.
+    """Holds the solution, each set's rows already divided by the level of its noise."""
 
-    Attributes:
-        model: what was fitted.
-        unknowns: (n_unknowns,) where the sum of squares is least.
-        level: (n_sets,) factor on every set's standard deviations.
-        residual: (n,) whitened.
-        jacobian: (n, n_unknowns) of the whitened residual.
-        bounds: (n_unknowns, 2) within which it was looked for.
-    """
-
-    model: FitModel
-    unknowns: Floats
-    level: Floats
-    residual: Floats
-    jacobian: Floats
-    bounds: Floats
+    model: FitModel  # what was fitted
+    unknowns: Floats  # (n_unknowns,) where the sum of squares is least
+    level: Floats  # (n_sets,) factor on every set's standard deviations
+    residual: Floats  # (n,) whitened
+    jacobian: Floats  # (n, n_unknowns) of the whitened residual
+    bounds: Floats  # (n_unknowns, 2) within which it was looked for
 
 
 def fit_least_squares(model: FitModel, near: Floats | None = None) -> Fit:

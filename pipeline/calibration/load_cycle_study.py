@@ -23,26 +23,18 @@ CHECKED = (*KNOWN, "difference", "force")
 
 
 class CyclePath(NamedTuple):
-    """Holds equilibria over a whole cycle.
+    """Holds equilibria over a whole cycle."""
 
-    Attributes:
-        approach: (n,) of the clamps, mm, there and back.
-        tension: (n,) N: the slope of the energy over the approach, negative in compression.
-        energy: (n,) stored, N mm.
-        turn: number of the farthest equilibrium.
-        jumps: number of times that the structure jumped.
-        reversals: number of jumps at no limit point, but where a ligament has turned by half a turn
-            against its units and its law's shear force changes sign: no path leads on there.
-        traced: (m, 2) approach, mm, and tension, N, along the path that the first jump leaves, not
-            stable from where the approach turns back to where it rises again; empty without a jump.
-    """
-
-    approach: Floats
-    tension: Floats
-    energy: Floats
-    turn: int
-    jumps: int
+    approach: Floats  # (n,) of the clamps, mm, there and back
+    tension: Floats  # (n,) N: the slope of the energy over the approach, negative in compression
+    energy: Floats  # (n,) stored, N mm
+    turn: int  # number of the farthest equilibrium
+    jumps: int  # number of times that the structure jumped
+    # number of jumps at no limit point, but where a ligament has turned by half a turn against its
+    # units and its law's shear force changes sign: no path leads on there
     reversals: int
+    # (m, 2) approach, mm, and tension, N, along the path that the first jump leaves, not stable
+    # from where the approach turns back to where it rises again; empty without a jump
     traced: Floats
 
     def compare(self, known: Floats) -> Floats:

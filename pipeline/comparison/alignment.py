@@ -31,23 +31,14 @@ _STILL = 0.1  # of the mean speed: neither way
 
 
 class Lag(NamedTuple):
-    """Tells the start of the nominal course on the clock of the measured one.
+    """Tells the start of the nominal course on the clock of the measured one."""
 
-    Attributes:
-        value: s.
-        sigma: its standard uncertainty, from what the fit leaves and how that is correlated, s.
-        correlation: of both courses.
-        gain: measured over nominal amplitude.
-        gain_sigma: likewise.
-        ambiguous: whether another lag is as good, as in a steady vibration.
-    """
-
-    value: float
-    sigma: float
-    correlation: float
-    gain: float
-    gain_sigma: float
-    ambiguous: bool
+    value: float  # s
+    sigma: float  # its standard uncertainty, from what the fit leaves and how that is correlated, s
+    correlation: float  # of both courses
+    gain: float  # measured over nominal amplitude
+    gain_sigma: float  # likewise
+    ambiguous: bool  # whether another lag is as good, as in a steady vibration
 
 
 @dataclass(frozen=True)

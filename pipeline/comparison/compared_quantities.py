@@ -16,18 +16,13 @@ FOLLOWED = ("mean_rotation", "mean_displacement", "contraction", "mimicking_erro
 
 
 class Quantity(NamedTuple):
-    """Holds a number that units have together.
+    """Holds a number that units have together."""
 
-    Attributes:
-        of: makes it (..., frames) of motions (..., frames, n, 3) in mm and rad.
-        units: (n,) places of the units that count.
-        less: (frames, n_units, 3) motion that is taken off theirs first.
-        sampled: whether they stand for others, so that an interval holds their scatter too.
-    """
-
+    # makes it (..., frames) of motions (..., frames, n, 3) in mm and rad
     of: Callable[[Floats], Floats]
-    units: Ints
-    less: Floats | None = None
+    units: Ints  # (n,) places of the units that count
+    less: Floats | None = None  # (frames, n_units, 3) motion that is taken off theirs first
+    # whether they stand for others, so that an interval holds their scatter too
     sampled: bool = True
 
     def along(self, motion: Floats, units: Ints) -> Floats:

@@ -37,29 +37,17 @@ _DRIVING = (
 
 
 class Compared(NamedTuple):
-    """Holds all parts of a comparison.
+    """Holds all parts of a comparison."""
 
-    Attributes:
-        measurement: the measured side.
-        axis: time or load.
-        simulation: under the measured motion, with its imperfect copies.
-        nominal: as the problem says.
-        quantities: what is followed, by its name.
-        design: as built.
-        frequency: of the drive, Hz; NaN without.
-        level: part of the copies in a band.
-        pixel: size of a pixel as calibrated and as stated, mm.
-    """
-
-    measurement: Measurement
-    axis: ComparisonAxis
-    simulation: SimulatedSide
-    nominal: NominalSide
-    quantities: dict[str, Quantity]
-    design: xr.Dataset
-    frequency: float
-    level: float
-    pixel: tuple[float, float]
+    measurement: Measurement  # the measured side
+    axis: ComparisonAxis  # time or load
+    simulation: SimulatedSide  # under the measured motion, with its imperfect copies
+    nominal: NominalSide  # as the problem says
+    quantities: dict[str, Quantity]  # what is followed, by its name
+    design: xr.Dataset  # as built
+    frequency: float  # of the drive, Hz; NaN without
+    level: float  # part of the copies in a band
+    pixel: tuple[float, float]  # size of a pixel as calibrated and as stated, mm
 
     @property
     def sides(self) -> Sides:

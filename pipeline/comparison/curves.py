@@ -18,21 +18,16 @@ _SEEN = 0.9  # of the frames, or a unit's peak may have been missed
 
 
 class Sides(NamedTuple):
-    """Holds the sides of a comparison at its frames.
+    """Holds the sides of a comparison at its frames."""
 
-    Attributes:
-        measured, sigma: (frames, units, 3) with their standard uncertainty.
-        simulated, nominal: likewise.
-        copies: (samples, frames, units, 3) imperfect copies of the simulated one, or none.
-        level: part of the copies in a band.
-    """
-
+    # measured, sigma: (frames, units, 3) with their standard uncertainty
     measured: Floats
     sigma: Floats
+    # simulated, nominal: likewise
     simulated: Floats
     nominal: Floats
-    copies: Floats
-    level: float
+    copies: Floats  # (samples, frames, units, 3) imperfect copies of the simulated one, or none
+    level: float  # part of the copies in a band
 
     @property
     def motions(self) -> tuple[Floats, Floats, Floats]:

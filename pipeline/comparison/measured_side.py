@@ -23,30 +23,19 @@ _SAME = 0.5  # mm between a vertex of the track and of the design
 
 
 class Measurement(NamedTuple):
-    """Holds the measured side, in the design's frame.
+    """Holds the measured side, in the design's frame."""
 
-    Attributes:
-        frames: (n_frames,) numbers of those that are compared, in the track.
-        time: (n_frames,) on the track's clock, s.
-        displacement, sigma: (n_frames, n_units, 3) mm and rad, NaN where not measured.
-        use: (n_units,) whether the unit is compared.
-        centre: (n_units, 2) at rest by the design, mm; NaN for those that are absent.
-        registration: of the units at rest.
-        track: the whole of it, turned into the design's frame.
-        drive: (n_frames, 2) mean displacement of the driven units, mm; NaN while none is seen.
-        force: (n_frames,) of the load cell, N; NaN without.
-    """
-
-    frames: Ints
-    time: Floats
+    frames: Ints  # (n_frames,) numbers of those that are compared, in the track
+    time: Floats  # (n_frames,) on the track's clock, s
+    # displacement, sigma: (n_frames, n_units, 3) mm and rad, NaN where not measured
     displacement: Floats
     sigma: Floats
-    use: NDArray[np.int8]
-    centre: Floats
-    registration: Registration
-    track: xr.Dataset
-    drive: Floats
-    force: Floats
+    use: NDArray[np.int8]  # (n_units,) whether the unit is compared
+    centre: Floats  # (n_units, 2) at rest by the design, mm; NaN for those that are absent
+    registration: Registration  # of the units at rest
+    track: xr.Dataset  # the whole of it, turned into the design's frame
+    drive: Floats  # (n_frames, 2) mean displacement of the driven units, mm; NaN while none is seen
+    force: Floats  # (n_frames,) of the load cell, N; NaN without
 
     @property
     def compared(self) -> Mask:

@@ -21,20 +21,15 @@ _STEPS = 6
 
 
 class Pair(NamedTuple):
-    """Holds both sides of a comparison, NaN in either where there is nothing to compare.
+    """Holds both sides of a comparison, NaN in either where there is nothing to compare."""
 
-    Attributes:
-        measured, simulated: (frames, units, dofs).
-        sigma: standard uncertainty of the measured ones.
-        slope: (frames, units, dofs) rate of the simulated ones, per s; None without a time.
-        added: whether noise of that uncertainty was added once more.
-    """
-
+    # measured, simulated: (frames, units, dofs)
     measured: Floats
     simulated: Floats
-    sigma: Floats
+    sigma: Floats  # standard uncertainty of the measured ones
+    # (frames, units, dofs) rate of the simulated ones, per s; None without a time
     slope: Floats | None = None
-    added: bool = False
+    added: bool = False  # whether noise of that uncertainty was added once more
 
     def taken(self, frames: Ints, units: Ints) -> "Pair":
         """Selects frames and units by number, which may come more than once."""

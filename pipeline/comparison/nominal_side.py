@@ -13,33 +13,20 @@ from sim.core import Floats
 
 
 class ComparisonAxis(NamedTuple):
-    """Holds the time or load that both sides have in common.
+    """Holds the time or load that both sides have in common."""
 
-    Attributes:
-        time: (frames,) of the response, s; NaN where it has none.
-        branch: (frames,) which way the load goes.
-        lag: of the drive; None for load, which has no time.
-        turn: direction of the measured less that of the nominal drive, rad.
-    """
-
-    time: Floats
-    branch: NDArray[np.int8]
-    lag: Lag | None
-    turn: float
+    time: Floats  # (frames,) of the response, s; NaN where it has none
+    branch: NDArray[np.int8]  # (frames,) which way the load goes
+    lag: Lag | None  # of the drive; None for load, which has no time
+    turn: float  # direction of the measured less that of the nominal drive, rad
 
 
 class NominalSide(NamedTuple):
-    """Holds the response at the frames.
+    """Holds the response at the frames."""
 
-    Attributes:
-        displacement: (frames, units, 3) mm and rad, NaN where there is none.
-        drive: (frames, 2) of the driven units, mm.
-        force: (frames,) of the drive along its direction, N.
-    """
-
-    displacement: Floats
-    drive: Floats
-    force: Floats
+    displacement: Floats  # (frames, units, 3) mm and rad, NaN where there is none
+    drive: Floats  # (frames, 2) of the driven units, mm
+    force: Floats  # (frames,) of the drive along its direction, N
 
 
 def drive_direction(response: xr.Dataset) -> Floats:

@@ -26,17 +26,11 @@ LEAST_SEEN = 8
 
 
 class HermiteMotion(NamedTuple):
-    """Interpolates a motion by values and slopes at equal intervals; it rests before and after.
+    """Interpolates a motion by values and slopes at equal intervals; it rests before and after."""
 
-    Attributes:
-        step: between the instants, s; the first is at zero.
-        value: (n, n_units, 3) mm, mm, rad.
-        slope: (n, n_units, 3) per s.
-    """
-
-    step: float
-    value: Numbers
-    slope: Numbers
+    step: float  # between the instants, s; the first is at zero
+    value: Numbers  # (n, n_units, 3) mm, mm, rad
+    slope: Numbers  # (n, n_units, 3) per s
 
     def __call__(self, times: Numbers) -> Numbers:
         """Computes the motion (n_times, n_units, 3) at times in s: cubic between the instants."""
@@ -52,39 +46,26 @@ class HermiteMotion(NamedTuple):
 
 
 class HeldMotion(NamedTuple):
-    """Holds the filtered motion of the units that supports and drive hold.
+    """Holds the filtered motion of the units that supports and drive hold."""
 
-    Attributes:
-        unit: (n,) places in the scene's lattice, ascending.
-        driven: (n,) whether the unit follows the drive; the others are clamped.
-        motion: (n_times, n, 3) of them all, as a function of the track's time.
-        noise: (n, 3) root mean square of what the filter took out: mm, mm, rad.
-        filled: (n,) part of the frames that were bridged.
-        assumed: (n,) whether the unit was hardly ever seen: it then rests if it is clamped, and
-            follows the mean of the driven ones if it is driven.
-    """
-
-    unit: Ints
-    driven: Mask
-    motion: HermiteMotion
-    noise: Floats
-    filled: Floats
+    unit: Ints  # (n,) places in the scene's lattice, ascending
+    driven: Mask  # (n,) whether the unit follows the drive; the others are clamped
+    motion: HermiteMotion  # (n_times, n, 3) of them all, as a function of the track's time
+    noise: Floats  # (n, 3) root mean square of what the filter took out: mm, mm, rad
+    filled: Floats  # (n,) part of the frames that were bridged
+    # (n,) whether the unit was hardly ever seen: it then rests if it is clamped, and follows the
+    # mean of the driven ones if it is driven
     assumed: Mask
 
 
 class RedrivenMotion(NamedTuple):
-    """Holds a simulation under the measured motion.
+    """Holds a simulation under the measured motion."""
 
-    Attributes:
-        displacement: (n_times, n_units, 3) of the units of the scene's lattice; NaN beyond the end
-            of a path that ended early.
-        drive_force: (n_times, 2) force of the drive on all driven units, N.
-        failure: why the path ended early.
-    """
-
+    # (n_times, n_units, 3) of the units of the scene's lattice; NaN beyond the end of a path that
+    # ended early
     displacement: Floats
-    drive_force: Floats
-    failure: str | None = None
+    drive_force: Floats  # (n_times, 2) force of the drive on all driven units, N
+    failure: str | None = None  # why the path ended early
 
 
 def filter_held_motion(track: xr.Dataset, scene: Scene) -> HeldMotion:

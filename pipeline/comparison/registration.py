@@ -16,23 +16,16 @@ _LEAST = 3  # units
 
 
 class Registration(NamedTuple):
-    """Maps the design's places to the measured ones, with standard uncertainties.
+    """Maps the design's places to the measured ones, with standard uncertainties."""
 
-    Attributes:
-        rotation: counter-clockwise, rad.
-        shift: (2,) of the specimen's middle, mm.
-        scale: measured over designed distances.
-        rotation_sigma, shift_sigma, scale_sigma: from the scatter of the units about it.
-        residual: root mean square distance that it leaves, mm.
-    """
-
-    rotation: float
-    shift: Floats
-    scale: float
+    rotation: float  # counter-clockwise, rad
+    shift: Floats  # (2,) of the specimen's middle, mm
+    scale: float  # measured over designed distances
+    # rotation_sigma, shift_sigma, scale_sigma: from the scatter of the units about it
     rotation_sigma: float
     shift_sigma: Floats
     scale_sigma: float
-    residual: float
+    residual: float  # root mean square distance that it leaves, mm
 
     def upright(self, motion: Floats) -> Floats:
         """Turns motions (..., 3) back into the design's frame."""

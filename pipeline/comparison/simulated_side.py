@@ -15,21 +15,14 @@ LOG = logging.getLogger(__name__)
 
 
 class SimulatedSide(NamedTuple):
-    """Holds the response of a structure to the measured motion of its held units.
+    """Holds the response of a structure to the measured motion of its held units."""
 
-    Attributes:
-        displacement: (frames, units, 3) of all units, mm and rad; NaN for those that are absent.
-        force: (frames,) of the drive along its direction, N.
-        copies: (samples, frames, units, 3) of imperfect copies under the same motion.
-        force_copies: (samples, frames) likewise.
-        failures: why the path ended early, and why copies have no simulation.
-    """
-
+    # (frames, units, 3) of all units, mm and rad; NaN for those that are absent
     displacement: Floats
-    force: Floats
-    copies: Floats
-    force_copies: Floats
-    failures: tuple[str, ...]
+    force: Floats  # (frames,) of the drive along its direction, N
+    copies: Floats  # (samples, frames, units, 3) of imperfect copies under the same motion
+    force_copies: Floats  # (samples, frames) likewise
+    failures: tuple[str, ...]  # why the path ended early, and why copies have no simulation
 
 
 def simulate_specimen(

@@ -28,17 +28,11 @@ STREAM = 1
 
 
 class Specimens(NamedTuple):
-    """Holds specimens that were simulated.
+    """Holds specimens that were simulated."""
 
-    Attributes:
-        displacement: (n_samples, n_times, n_units, 3) of the units of the structure's lattice.
-        drive_force: (n_samples, n_times, 2) force of the drive on all driven units, N.
-        failures: of each specimen drawn that has no simulation, why.
-    """
-
-    displacement: Floats
-    drive_force: Floats
-    failures: tuple[str, ...]
+    displacement: Floats  # (n_samples, n_times, n_units, 3) of the units of the structure's lattice
+    drive_force: Floats  # (n_samples, n_times, 2) force of the drive on all driven units, N
+    failures: tuple[str, ...]  # of each specimen drawn that has no simulation, why
 
 
 def sample_specimens(

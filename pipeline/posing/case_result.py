@@ -50,32 +50,22 @@ class PosedStructure(NamedTuple):
 
 
 class Times(NamedTuple):
-    """Holds the times of the output.
+    """Holds the times of the output."""
 
-    Attributes:
-        asked: all times, ascending, s.
-        shown, integrated, sampled: where in them the response's own samples are, those of the
-            loss's integral, and those of the authors' sum.
-    """
-
-    asked: Floats
+    asked: Floats  # all times, ascending, s
+    # shown, integrated, sampled: where in them the response's own samples are, those of the loss's
+    # integral, and those of the authors' sum
     shown: Ints
     integrated: Ints
     sampled: Ints
 
 
 class TracedPath(NamedTuple):
-    """Holds a path of equilibria through a snap, point by point; one of NaN where there is none.
+    """Holds a path of equilibria through a snap, point by point; one of NaN where there is none."""
 
-    Attributes:
-        load: (n_points,) load parameters, s.
-        force: (n_points, 2) of the drive, N.
-        eigenvalue: (n_points,) smallest of the tangent, N/mm.
-    """
-
-    load: Floats
-    force: Floats
-    eigenvalue: Floats
+    load: Floats  # (n_points,) load parameters, s
+    force: Floats  # (n_points, 2) of the drive, N
+    eigenvalue: Floats  # (n_points,) smallest of the tangent, N/mm
 
 
 class CaseResult(NamedTuple):

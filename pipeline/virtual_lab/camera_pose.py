@@ -10,15 +10,10 @@ from sim.core import Floats
 
 
 class Viewpoint(NamedTuple):
-    """Holds a camera in front of the specimen.
+    """Holds a camera in front of the specimen."""
 
-    Attributes:
-        camera: of the plane of the units' faces.
-        eye: (3,) centre of projection in the specimen's frame, z towards the camera, mm.
-    """
-
-    camera: Camera
-    eye: Floats
+    camera: Camera  # of the plane of the units' faces
+    eye: Floats  # (3,) centre of projection in the specimen's frame, z towards the camera, mm
 
     def behind(self, points: Floats, depth: float) -> Floats:
         """Projects points so far behind the faces' plane to places (..., 2) on it, mm."""

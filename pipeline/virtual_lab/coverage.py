@@ -15,17 +15,12 @@ from sim.core import Floats, Ints
 
 
 class NestedPolygons(NamedTuple):
-    """Holds closed polygons, one behind the other.
+    """Holds closed polygons, one behind the other."""
 
-    Attributes:
-        points: (n, 2) vertices, column and row.
-        start: (rings + 1,) where each begins.
-        shade: (rings,) what each adds where it covers, if it runs counter-clockwise as seen (rows
-            count downwards); the negative of it for one that runs the other way.
-    """
-
-    points: Floats
-    start: Ints
+    points: Floats  # (n, 2) vertices, column and row
+    start: Ints  # (rings + 1,) where each begins
+    # (rings,) what each adds where it covers, if it runs counter-clockwise as seen (rows count
+    # downwards); the negative of it for one that runs the other way
     shade: Floats
 
 

@@ -16,17 +16,11 @@ _RIM = 0.15  # mm between a speckle and the rim of the face
 
 
 class FaceMarks(NamedTuple):
-    """Discs on the faces.
+    """Discs on the faces."""
 
-    Attributes:
-        unit: (marks,) on which unit, as a place in the specimen.
-        centre: (marks, 2) relative to the unit's centroid at rest, mm.
-        diameter: (marks,) mm.
-    """
-
-    unit: Ints
-    centre: Floats
-    diameter: Floats
+    unit: Ints  # (marks,) on which unit, as a place in the specimen
+    centre: Floats  # (marks, 2) relative to the unit's centroid at rest, mm
+    diameter: Floats  # (marks,) mm
 
 
 def draw_marks(specimen: SpecimenOutlines, kind: str, look: UnitAppearance, seed: int) -> FaceMarks:

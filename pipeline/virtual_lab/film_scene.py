@@ -22,21 +22,13 @@ _CORNERS = 32  # of a disc
 
 
 class FilmScene(NamedTuple):
-    """Holds what is filmed.
+    """Holds what is filmed."""
 
-    Attributes:
-        specimen: the units.
-        ligament: (ligaments, 2, 2) unit and vertex, as places in the specimen, at either end.
-        marks: on the faces.
-        look: shades and thickness.
-        view: the camera.
-    """
-
-    specimen: SpecimenOutlines
-    ligament: Ints
-    marks: FaceMarks
-    look: UnitAppearance
-    view: Viewpoint
+    specimen: SpecimenOutlines  # the units
+    ligament: Ints  # (ligaments, 2, 2) unit and vertex, as places in the specimen, at either end
+    marks: FaceMarks  # on the faces
+    look: UnitAppearance  # shades and thickness
+    view: Viewpoint  # the camera
 
 
 class _Layer(NamedTuple):

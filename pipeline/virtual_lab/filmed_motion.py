@@ -17,34 +17,22 @@ _NOISE_STREAM = 3
 
 
 class FilmedMotion(NamedTuple):
-    """Holds poses of the units that are present, over the frames.
+    """Holds poses of the units that are present, over the frames."""
 
-    Attributes:
-        time: (frames,) of the video, at mid-exposure, s.
-        pose: (frames, units, 3) at mid-exposure, mm and rad.
-        instants: (frames, instants, units, 3) poses that each exposure averages.
-    """
-
-    time: Floats
-    pose: Floats
-    instants: Floats
+    time: Floats  # (frames,) of the video, at mid-exposure, s
+    pose: Floats  # (frames, units, 3) at mid-exposure, mm and rad
+    instants: Floats  # (frames, instants, units, 3) poses that each exposure averages
 
 
 class FilmClock(NamedTuple):
-    """Maps times of a video to times of the response.
+    """Maps times of a video to times of the response."""
 
-    Attributes:
-        frames: number of them.
-        start, end: times of the response, s.
-        still: rest at the video's start, s.
-        pace: how fast the response's time goes.
-    """
-
-    frames: int
+    frames: int  # number of them
+    # start, end: times of the response, s
     start: float
     end: float
-    still: float
-    pace: float
+    still: float  # rest at the video's start, s
+    pace: float  # how fast the response's time goes
 
     def shown(self, instant: Floats) -> Floats:
         """Times of the response at instants of the video, s."""

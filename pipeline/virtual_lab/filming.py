@@ -24,21 +24,13 @@ _MAINS = 100.0  # Hz
 
 
 class VirtualFilm(NamedTuple):
-    """Holds all that is needed to render.
+    """Holds all that is needed to render."""
 
-    Attributes:
-        scene: what is filmed.
-        motion: of the units.
-        response: what the structure does.
-        present: (units,) which of them are there.
-        asked: the set-up.
-    """
-
-    scene: FilmScene
-    motion: FilmedMotion
-    response: xr.Dataset
-    present: Mask
-    asked: VirtualRecording
+    scene: FilmScene  # what is filmed
+    motion: FilmedMotion  # of the units
+    response: xr.Dataset  # what the structure does
+    present: Mask  # (units,) which of them are there
+    asked: VirtualRecording  # the set-up
 
     def images(self, tell: Callable[[], None] | None = None) -> Iterator[Image]:
         """Renders the frames, in sequence; ``tell`` is called after each."""

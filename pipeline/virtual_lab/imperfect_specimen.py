@@ -19,22 +19,14 @@ SAMPLES = 1001
 
 
 class ImperfectDrive(NamedTuple):
-    """Drives not quite as planned (``sim.solvers.loads.MotionLaw``).
+    """Drives not quite as planned (``sim.solvers.loads.MotionLaw``)."""
 
-    Attributes:
-        planned: the motion that was asked for.
-        place: (n_units, 2) of the driven units from their middle, mm.
-        largest: (2,) the planned motion's largest displacement, mm.
-        turning: when a static load is taken off again, s; past the end if it is not.
-        end: of the motion, s.
-        gain, turn, cross, tilt, drift, delay: see ``Shaking``.
-    """
-
-    planned: MotionLaw
-    place: Numbers
-    largest: Numbers
-    turning: float
-    end: float
+    planned: MotionLaw  # the motion that was asked for
+    place: Numbers  # (n_units, 2) of the driven units from their middle, mm
+    largest: Numbers  # (2,) the planned motion's largest displacement, mm
+    turning: float  # when a static load is taken off again, s; past the end if it is not
+    end: float  # of the motion, s
+    # gain, turn, cross, tilt, drift, delay: see ``Shaking``
     gain: float
     turn: float
     cross: float

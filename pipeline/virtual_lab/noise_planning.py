@@ -48,19 +48,12 @@ class PlannedSetup(NamedTuple):
 
 
 class ExpectedNoise(NamedTuple):
-    """Holds errors and stated uncertainties (3,) of a set-up in px, px and deg.
+    """Holds errors and stated uncertainties (3,) of a set-up in px, px and deg."""
 
-    Attributes:
-        rmse: root mean square of the error of x, y and rotation.
-        sigma: median of the stated standard uncertainty.
-        lost: part of the units and frames that were not found.
-        pixel: size of a pixel, mm.
-    """
-
-    rmse: Floats
-    sigma: Floats
-    lost: float
-    pixel: float
+    rmse: Floats  # root mean square of the error of x, y and rotation
+    sigma: Floats  # median of the stated standard uncertainty
+    lost: float  # part of the units and frames that were not found
+    pixel: float  # size of a pixel, mm
 
     @property
     def words(self) -> Mapping[str, str]:
@@ -75,21 +68,13 @@ class ExpectedNoise(NamedTuple):
 
 
 class SetupOptions(NamedTuple):
-    """Holds values to try in every combination; none leaves the base's own.
+    """Holds values to try in every combination; none leaves the base's own."""
 
-    Attributes:
-        specimens: dots, speckle or bare.
-        scales: pixels per pitch; the image grows along.
-        rates: frames per second.
-        codecs: names, as for `codec`.
-        markers: diameters of dots or speckles, mm.
-    """
-
-    specimens: tuple[str, ...]
-    scales: tuple[float, ...]
-    rates: tuple[float, ...]
-    codecs: tuple[str, ...]
-    markers: tuple[float, ...]
+    specimens: tuple[str, ...]  # dots, speckle or bare
+    scales: tuple[float, ...]  # pixels per pitch; the image grows along
+    rates: tuple[float, ...]  # frames per second
+    codecs: tuple[str, ...]  # names, as for `codec`
+    markers: tuple[float, ...]  # diameters of dots or speckles, mm
 
 
 def setup_combinations(base: PlannedSetup, tried: SetupOptions) -> list[PlannedSetup]:

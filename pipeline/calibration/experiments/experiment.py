@@ -25,38 +25,27 @@ ELASTIC: tuple[ConstantName, ...] = (
 
 @dataclass(frozen=True)
 class MeasuredValues:
-    """Holds the measured values of one set.
+    """Holds the measured values of one set."""
 
-    Attributes:
-        name: of the set.
-        kind: of the set.
-        abscissa: (n,) displacement in mm, or time in s.
-        values: (n,) forces in N, angles in rad, or displacements in mm and rad.
-        sigma: (n,) standard deviations, or their ratios only.
-        known: whether the standard deviations hold as they are.
-        channel: (n,) which course each value belongs to; of a track, 3 unit + dof, the load cell's
-            last.
-        bias: (n,) standard deviation of what a channel's values have in common besides; infinite
-            where it is unknown, so that a channel's mean tells nothing.
-        axes: (n, r) orthonormal directions of whitened values in which a common cause, such as
-            the noise of the drive, scatters them besides.
-        spread: (r,) standard deviation along them by that cause alone.
-        mixture: (m, r) what of the m independent causes each is made of.
-        remarks: what a reader should know of the set, a sentence each.
-    """
-
-    name: str
-    kind: Kind
-    abscissa: Floats
-    values: Floats
-    sigma: Floats
-    known: bool
+    name: str  # of the set
+    kind: Kind  # of the set
+    abscissa: Floats  # (n,) displacement in mm, or time in s
+    values: Floats  # (n,) forces in N, angles in rad, or displacements in mm and rad
+    sigma: Floats  # (n,) standard deviations, or their ratios only
+    known: bool  # whether the standard deviations hold as they are
+    # (n,) which course each value belongs to; of a track, 3 unit + dof, the load cell's last
     channel: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    # (n,) standard deviation of what a channel's values have in common besides; infinite where it
+    # is unknown, so that a channel's mean tells nothing
     bias: Floats = field(default_factory=lambda: np.zeros(0))
+    # (n, r) orthonormal directions of whitened values in which a common cause, such as the noise of
+    # the drive, scatters them besides
     axes: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    # (r,) standard deviation along them by that cause alone
     spread: Floats = field(default_factory=lambda: np.zeros(0))
+    # (m, r) what of the m independent causes each is made of
     mixture: Floats = field(default_factory=lambda: np.zeros((0, 0)))
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what a reader should know of the set, a sentence each
 
     def whitened(self, deviation: Floats) -> Floats:
         """Scales deviations (n, ...) to numbers of unit variance, without correlation.

@@ -22,16 +22,12 @@ SAMPLES = 32
 
 
 class DecayPeaks(NamedTuple):
-    """Holds the decay by a line through the logarithms of peaks.
+    """Holds the decay by a line through the logarithms of peaks."""
 
-    Attributes:
-        ratio, error: damping ratio and its standard error.
-        frequency: of the damped oscillation, rad/s.
-    """
-
+    # ratio, error: damping ratio and its standard error
     ratio: float
     error: float
-    frequency: float
+    frequency: float  # of the damped oscillation, rad/s
 
 
 def read(asked: FreeDecay, folder: Path) -> tuple[Floats, Floats]:

@@ -46,22 +46,17 @@ COARSE = (
 
 @dataclass(frozen=True)
 class FullFieldExperiment:
-    """Holds a track as an experiment (``experiment.Experiment``).
+    """Holds a track as an experiment (``experiment.Experiment``)."""
 
-    Attributes:
-        measured: displacements of the free units, one course after the other; then the load.
-        simulation: of the specimen under the measured motion of the held units.
-        sees: the constants that the motion depends on.
-        changes: of that motion by one standard deviation of its noise, in independent ways.
-        drive: the motion with those changes that the free units speak for, if it is known.
-        part: (n,) of the motion that these changes make.
-    """
-
+    # displacements of the free units, one course after the other; then the load
     measured: MeasuredValues
-    simulation: SpecimenSimulation
-    sees: tuple[ConstantName, ...]
+    simulation: SpecimenSimulation  # of the specimen under the measured motion of the held units
+    sees: tuple[ConstantName, ...]  # the constants that the motion depends on
+    # of that motion by one standard deviation of its noise, in independent ways
     changes: tuple[DriveChange, ...]
+    # the motion with those changes that the free units speak for, if it is known
     drive: PrescribedMotion | None = None
+    # (n,) of the motion that these changes make
     part: Floats = field(default_factory=lambda: np.zeros(()))
 
     @property

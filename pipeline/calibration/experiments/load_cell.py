@@ -18,25 +18,15 @@ from sim.structure import DistanceContact
 
 
 class LoadCellReadings(NamedTuple):
-    """Readings of a load cell.
+    """Readings of a load cell."""
 
-    Attributes:
-        frame: (n,) in which there are any.
-        time: (n,) of these, s.
-        value: (n,) N.
-        sigma: standard deviation, N.
-        tare: whether the cell's zero is unknown.
-        force: what it reads of motions (n, n_units, 3) of the specimen.
-        channel: its course, after those of all units.
-    """
-
-    frame: Ints
-    time: Floats
-    value: Floats
-    sigma: float
-    tare: bool
-    force: Seen
-    channel: int
+    frame: Ints  # (n,) in which there are any
+    time: Floats  # (n,) of these, s
+    value: Floats  # (n,) N
+    sigma: float  # standard deviation, N
+    tare: bool  # whether the cell's zero is unknown
+    force: Seen  # what it reads of motions (n, n_units, 3) of the specimen
+    channel: int  # its course, after those of all units
 
     def joined(self, motion: MeasuredValues) -> MeasuredValues:
         """Appends the readings to a motion."""

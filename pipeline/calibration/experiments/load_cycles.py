@@ -21,14 +21,10 @@ SUDDEN = 0.2
 
 
 class LoadBranch(NamedTuple):
-    """Holds one way of a cycle.
+    """Holds one way of a cycle."""
 
-    Attributes:
-        loading: whether the displacement rises.
-        displacement, force: (n,) in the order of time, mm and N.
-    """
-
-    loading: bool
+    loading: bool  # whether the displacement rises
+    # displacement, force: (n,) in the order of time, mm and N
     displacement: Floats
     force: Floats
 

@@ -35,15 +35,12 @@ _PART = 0.5
 
 
 class DriveChange(NamedTuple):
-    """Changes one course of a drive by one standard deviation of its noise.
+    """Changes one course of a drive by one standard deviation of its noise."""
 
-    Attributes:
-        place, dof: which course.
-        value, slope: (n,) at the knots.
-    """
-
+    # place, dof: which course
     place: int
     dof: int
+    # value, slope: (n,) at the knots
     value: Floats
     slope: Floats
 
@@ -60,37 +57,24 @@ def apply_changes(
 
 
 class SmoothedDrive(NamedTuple):
-    """Holds the drive of a fit.
+    """Holds the drive of a fit."""
 
-    Attributes:
-        held: units, and their motion by values and slopes at the knots.
-        changes: of that motion, independent of one another.
-        coarse: whether the frames are too few for enough intervals.
-    """
-
-    held: redrive.HeldMotion
-    changes: tuple[DriveChange, ...]
-    coarse: bool
+    held: redrive.HeldMotion  # units, and their motion by values and slopes at the knots
+    changes: tuple[DriveChange, ...]  # of that motion, independent of one another
+    coarse: bool  # whether the frames are too few for enough intervals
 
 
 @dataclass(frozen=True)
 class _HeldCourses:
-    """Holds courses of the held units. At the first frame they rest: it tells the constants.
+    """Holds courses of the held units. At the first frame they rest: it tells the constants."""
 
-    Attributes:
-        time: (n,) s.
-        measured, sigma: (n, n_held, 3) mm, mm, rad.
-        there: (n, n_held) whether the unit was seen.
-        bias: (3,) standard deviation of what stays with a unit through all frames.
-        reach: (3,) range of the motions, mm, mm, rad.
-    """
-
-    time: Floats
+    time: Floats  # (n,) s
+    # measured, sigma: (n, n_held, 3) mm, mm, rad
     measured: Floats
     sigma: Floats
-    there: np.ndarray
-    bias: Floats
-    reach: Floats
+    there: np.ndarray  # (n, n_held) whether the unit was seen
+    bias: Floats  # (3,) standard deviation of what stays with a unit through all frames
+    reach: Floats  # (3,) range of the motions, mm, mm, rad
 
     def equations(self, intervals: int, place: int, dof: int) -> tuple[Floats, Floats]:
         """Builds whitened equations (n, 1 + n_coefficients) of a course, and right sides (n,).

@@ -33,26 +33,16 @@ Seen = Callable[[Numbers, Parameters], Array]
 
 @dataclass(frozen=True)
 class SpecimenSimulation:
-    """Simulates a specimen on its measured drive.
+    """Simulates a specimen on its measured drive."""
 
-    Attributes:
-        lattice: its network.
-        vertices: (n_vertices, 2) as built, mm.
-        density: tonne/mm^2.
-        contact: stiffness, N mm/rad^2.
-        solver: of its motion.
-        drive: of its held units.
-        seen: what is measured of the motion.
-        stiffer: (n_ligaments,) or (1,) factor on the stiffness of each ligament.
-    """
-
-    lattice: Lattice
-    vertices: Floats
-    density: float
-    contact: float
-    solver: AnySolver
-    drive: PrescribedMotion
-    seen: Seen
+    lattice: Lattice  # its network
+    vertices: Floats  # (n_vertices, 2) as built, mm
+    density: float  # tonne/mm^2
+    contact: float  # stiffness, N mm/rad^2
+    solver: AnySolver  # of its motion
+    drive: PrescribedMotion  # of its held units
+    seen: Seen  # what is measured of the motion
+    # (n_ligaments,) or (1,) factor on the stiffness of each ligament
     stiffer: Floats = field(default_factory=lambda: np.ones(1))
 
     @cached_property

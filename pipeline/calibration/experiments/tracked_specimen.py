@@ -21,17 +21,11 @@ LEAST_FRAMES = 8
 
 
 class TrackedSpecimen(NamedTuple):
-    """Holds a structure of a study.
+    """Holds a structure of a study."""
 
-    Attributes:
-        problem: of the study.
-        scene: of the structure, under the problem's drives.
-        stiffer: (n_ligaments,) factor on the stiffness of each ligament.
-    """
-
-    problem: Problem
-    scene: Scene
-    stiffer: Floats
+    problem: Problem  # of the study
+    scene: Scene  # of the structure, under the problem's drives
+    stiffer: Floats  # (n_ligaments,) factor on the stiffness of each ligament
 
     def vertices(self, track: xr.Dataset, path: Path) -> Floats:
         """Reads the vertices (n_vertices, 2) as built, mm.

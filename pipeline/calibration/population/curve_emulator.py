@@ -29,18 +29,12 @@ TRIALS = 40
 
 
 class CurveEmulator(NamedTuple):
-    """Interpolates the curve of one specimen and test.
+    """Interpolates the curve of one specimen and test."""
 
-    Attributes:
-        displacement: (STEPS,) mm.
-        centre: (2,) of the logarithms of the ratios.
-        coefficients: (orders + 1, orders + 1, STEPS) of g.
-        error: largest relative error of the force at random constants that it was not made from.
-    """
-
-    displacement: Floats
-    centre: Floats
-    coefficients: Floats
+    displacement: Floats  # (STEPS,) mm
+    centre: Floats  # (2,) of the logarithms of the ratios
+    coefficients: Floats  # (orders + 1, orders + 1, STEPS) of g
+    # largest relative error of the force at random constants that it was not made from
     error: float
 
     def weights(self, displacement: Floats) -> Floats:

@@ -44,26 +44,16 @@ Draws = Mapping[str, Floats]
 
 
 class Readings(NamedTuple):
-    """Holds the readings of all kinds of test, each filled up to as many as any has.
+    """Holds the readings of all kinds of test, each filled up to as many as any has."""
 
-    Attributes:
-        used: (n_kinds, n) one for what the fit is to see, zero for the rest.
-        log_force: (n_kinds, n) of forces in N.
-        shares: (n_kinds, n, n_samples) of each sample in the mean that was read; a one for a
-            sample's own.
-        place: (n_kinds, n) displacement over the largest one.
-        base: (n_kinds, n) logarithm of the displacement in mm.
-        weights: (n_kinds, n, ...) of the emulator.
-        ratios: (2,) its centre.
-    """
-
-    used: Numbers
-    log_force: Numbers
+    used: Numbers  # (n_kinds, n) one for what the fit is to see, zero for the rest
+    log_force: Numbers  # (n_kinds, n) of forces in N
+    # (n_kinds, n, n_samples) of each sample in the mean that was read; a one for a sample's own
     shares: Numbers
-    place: Numbers
-    base: Numbers
-    weights: Numbers
-    ratios: Numbers
+    place: Numbers  # (n_kinds, n) displacement over the largest one
+    base: Numbers  # (n_kinds, n) logarithm of the displacement in mm
+    weights: Numbers  # (n_kinds, n, ...) of the emulator
+    ratios: Numbers  # (2,) its centre
 
     def of_samples(self, logs: Numbers) -> Array:
         """Predicts (n_kinds, n_samples, n) logarithms of forces at the constants (n_samples, 3)."""

@@ -28,24 +28,17 @@ STEPS = 60
 
 
 class TestPath(NamedTuple):
-    """Holds the equilibria of one specimen and test.
+    """Holds the equilibria of one specimen and test."""
 
-    Attributes:
-        displacement: (n,) of the grips from zero on, mm.
-        force: (n,) N.
-        motion: (n, n_units, 3) mm, mm, rad.
-        stretch, shear, bend: (n, n_ligaments) mm, rad, rad.
-        law: (n_ligaments, 3) stiffness.
-        mass, damping: (n_units, 3).
-    """
-
-    displacement: Floats
-    force: Floats
-    motion: Floats
+    displacement: Floats  # (n,) of the grips from zero on, mm
+    force: Floats  # (n,) N
+    motion: Floats  # (n, n_units, 3) mm, mm, rad
+    # stretch, shear, bend: (n, n_ligaments) mm, rad, rad
     stretch: Floats
     shear: Floats
     bend: Floats
-    law: Floats
+    law: Floats  # (n_ligaments, 3) stiffness
+    # mass, damping: (n_units, 3)
     mass: Floats
     damping: Floats
 
@@ -88,17 +81,11 @@ def _itself(motion: Numbers, _: Parameters) -> Array:
 
 
 class Mechanism(NamedTuple):
-    """Describes physics that the model leaves out: its plausible size, and what it does there.
+    """Describes physics that the model leaves out: its plausible size, and what it does there."""
 
-    Attributes:
-        name: in words.
-        size: in words.
-        change: of the force (n,) along a path, N.
-    """
-
-    name: str
-    size: str
-    change: Callable[[TestPath], Floats]
+    name: str  # in words
+    size: str  # in words
+    change: Callable[[TestPath], Floats]  # of the force (n,) along a path, N
 
 
 def _friction(path: TestPath) -> Floats:
@@ -152,34 +139,24 @@ MECHANISMS = (
 
 
 class RankedMechanism(NamedTuple):
-    """Holds of a mechanism what it changes the prediction by, of either sign where it has none.
+    """Holds of a mechanism what it changes the prediction by, of either sign where it has none."""
 
-    Attributes:
-        name, size: in words.
-        change: (n,) of the logarithm of the predicted force, after the constants took up theirs.
-        explained: part of the residual's root mean square that it takes away, at that size.
-        alone: the same if it acted in the predicted test alone, and the constants took up nothing.
-        wanted: factor on the size that takes away most.
-    """
-
+    # name, size: in words
     name: str
     size: str
+    # (n,) of the logarithm of the predicted force, after the constants took up theirs
     change: Floats
-    explained: float
+    explained: float  # part of the residual's root mean square that it takes away, at that size
+    # the same if it acted in the predicted test alone, and the constants took up nothing
     alone: float
-    wanted: float
+    wanted: float  # factor on the size that takes away most
 
 
 class FittedSlopes(NamedTuple):
-    """Holds derivatives of logarithms of forces by those of the constants.
+    """Holds derivatives of logarithms of forces by those of the constants."""
 
-    Attributes:
-        fitted: of every test of the fit (n_points, 3), at even displacements.
-        predicted: (n, 3).
-    """
-
-    fitted: Sequence[Floats]
-    predicted: Floats
+    fitted: Sequence[Floats]  # of every test of the fit (n_points, 3), at even displacements
+    predicted: Floats  # (n, 3)
 
 
 def rank_mechanisms(

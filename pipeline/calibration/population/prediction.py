@@ -6,17 +6,22 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
+from pipeline.calibration.inputs import Sampling
 from pipeline.calibration.population.curve_emulator import CurveEmulator, log_force
 from pipeline.calibration.population.hierarchical_model import (
     Draws,
     PriorNumbers,
+    Readings,
     correlation,
+    sample_posteriors,
 )
 from sim.core import Floats
 
 LEVEL = 0.95
 REPEATS = 64
 """New samples for every draw from the posterior."""
+NEW_CURVES = 100
+"""For every simulated set of samples."""
 _REACH = np.linspace(-5.0, 5.0, 201)
 """Sums the law of a spread at these, in standard deviations of its prior."""
 _JITTER = 1e-10
@@ -44,21 +49,13 @@ class PredictionBand(NamedTuple):
 
 
 class PosedCurve(NamedTuple):
-    """Holds where a curve is to be predicted, and its emulator there.
+    """Holds where a curve is to be predicted, and its emulator there."""
 
-    Attributes:
-        displacement: (n,) mm.
-        place: (n,) over the largest one.
-        weights: (n, ...) of the emulator.
-        ratios: (2,) its centre.
-        kind: number of its kind of test among those fitted.
-    """
-
-    displacement: Floats
-    place: Floats
-    weights: Floats
-    ratios: Floats
-    kind: int
+    displacement: Floats  # (n,) mm
+    place: Floats  # (n,) over the largest one
+    weights: Floats  # (n, ...) of the emulator
+    ratios: Floats  # (2,) its centre
+    kind: int  # number of its kind of test among those fitted
 
     def predict(self, logs: Floats) -> Floats:
         """Predicts (..., n) logarithms of forces at the constants (..., 3)."""
@@ -177,3 +174,55 @@ def student_band(curve: PosedCurve, constants: Floats) -> PredictionBand:
 def medians(draws: Draws) -> Mapping[str, Floats]:
     """Takes medians over the draws of one posterior."""
     return {name: np.median(draws[name], axis=0) for name in _DRAWN}
+
+
+class Coverage(NamedTuple):
+    """Holds of every simulated set (n_sets,) the part of new curves inside, and relative widths."""
+
+    inside: Floats  # part of the new curves that lie inside as a whole
+    width: Floats  # of the band, over that of Student's interval of the same samples
+
+
+def try_band(
+    readings: Readings,
+    priors: PriorNumbers,
+    curve: PosedCurve,
+    truth: Mapping[str, Floats],
+    effort: Sampling,
+    seed: int = 1,
+) -> Coverage:
+    """Simulates sets of samples from a known population, and fits each as if it were measured.
+
+    Args:
+        readings: the design: which samples are read in which test, and where.
+        priors: of the fit.
+        curve: that is predicted.
+        truth: mean, spread (3,), discrepancy (), mounting and reading (n_kinds,).
+        effort: how many sets, and how long each is sampled.
+        seed: of all.
+    """
+    random, n_sets = np.random.default_rng(seed), effort.simulated_sets
+    n_samples = readings.shares.shape[-1]
+    logs = truth["mean"] + truth["spread"] * random.normal(size=(n_sets, n_samples, 3))
+    scales = (truth["discrepancy"], truth["mounting"], truth["reading"])
+    roots = np.linalg.cholesky(readings.covariance(*scales))
+    noise = np.einsum("tnm,stm->stn", roots, random.normal(size=(n_sets, *readings.used.shape)))
+    made = np.array([readings.expected(each) for each in logs]) + noise
+    alike = np.broadcast_to
+    found = sample_posteriors(
+        readings._replace(log_force=made, used=alike(readings.used, made.shape)),
+        PriorNumbers(*(alike(each, (n_sets, *np.shape(each))) for each in priors)),
+        warm_up=effort.simulated_draws,
+        draws=effort.simulated_draws,
+        seed=seed,
+    )
+    same = {name: np.asarray(value)[None] for name, value in truth.items()}
+    new = new_curves(curve, same | {"constants": logs[:1]}, random, repeats=NEW_CURVES * n_sets)
+    inside, width = np.empty(n_sets), np.empty(n_sets)
+    for k, curves in enumerate(new.reshape(n_sets, NEW_CURVES, -1)):
+        draws = {name: values[k] for name, values in found.items()}
+        known = redraw_population(draws, priors, random)
+        band = find_band(new_curves(curve, known, random))
+        inside[k] = band.holds(curves).mean()
+        width[k] = band.half_width / student_band(curve, medians(draws)["constants"]).half_width
+    return Coverage(inside, width)

@@ -15,18 +15,12 @@ from sim.core import Floats
 
 
 class SampleCurve(NamedTuple):
-    """Holds a curve as it was read.
+    """Holds a curve as it was read."""
 
-    Attributes:
-        name: of the set.
-        test: its kind.
-        samples: that it is the mean of.
-        displacement, force: (n,) mm, N.
-    """
-
-    name: str
-    test: TestKind
-    samples: tuple[str, ...]
+    name: str  # of the set
+    test: TestKind  # its kind
+    samples: tuple[str, ...]  # that it is the mean of
+    # displacement, force: (n,) mm, N
     displacement: Floats
     force: Floats
 

@@ -11,7 +11,6 @@ import xarray as xr
 from numpyro.diagnostics import gelman_rubin
 
 from pipeline.calibration.inputs import ELASTIC_NAMES, Constants, Population, TestKind
-from pipeline.calibration.population.coverage import try_band
 from pipeline.calibration.population.curve_emulator import CurveEmulator, emulate, log_force
 from pipeline.calibration.population.hierarchical_model import (
     FACTORS,
@@ -37,6 +36,7 @@ from pipeline.calibration.population.prediction import (
     pose_curve,
     redraw_population,
     student_band,
+    try_band,
 )
 from pipeline.calibration.population.sample_readings import (
     SampleCurve,
@@ -56,23 +56,16 @@ _REPEATS = 8
 
 
 class FittedPopulation(NamedTuple):
-    """Holds what a study has found.
+    """Holds what a study has found."""
 
-    Attributes:
-        asked: for what.
-        curves: as read.
-        emulators: of every kind of test; `predicted` is that of the other specimen.
-        readings: as fitted, and the curve that each is of.
-        posteriors: draws by what was left out of the fit, "" for nothing.
-    """
-
-    asked: Population
-    curves: Sequence[SampleCurve]
+    asked: Population  # for what
+    curves: Sequence[SampleCurve]  # as read
+    # of every kind of test; `predicted` is that of the other specimen
     emulators: Mapping[TestKind, CurveEmulator]
     predicted: CurveEmulator
-    readings: Readings
+    readings: Readings  # as fitted, and the curve that each is of
     names: Sequence[Sequence[str]]
-    posteriors: Mapping[str, Draws]
+    posteriors: Mapping[str, Draws]  # draws by what was left out of the fit, "" for nothing
 
 
 def validate_population(asked: Population, folder: Path) -> xr.Dataset:

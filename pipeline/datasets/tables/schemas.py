@@ -42,17 +42,11 @@ Table = dict[str, Variable]
 
 
 class Schema(NamedTuple):
-    """Describes one kind of dataset.
+    """Describes one kind of dataset."""
 
-    Attributes:
-        table: its variables, in the order in which they are written.
-        title: what it holds, in a line; a dataset may have a title of its own.
-        attributes: what it tells in attributes of its own, beside its provenance.
-    """
-
-    table: Table
-    title: str
-    attributes: Mapping[str, str]
+    table: Table  # its variables, in the order in which they are written
+    title: str  # what it holds, in a line; a dataset may have a title of its own
+    attributes: Mapping[str, str]  # what it tells in attributes of its own, beside its provenance
 
 
 def _table(entries: Mapping[str, dict[str, Any]]) -> Table:

@@ -23,14 +23,10 @@ _HEADING = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\])]+)[\])]")
 
 
 class CsvCells(NamedTuple):
-    """Holds the cells of a CSV.
+    """Holds the cells of a CSV."""
 
-    Attributes:
-        rows: of cells, without blanks about them.
-        separator: a comma, semicolon or tab; with the latter two, a comma may be the decimal sign.
-    """
-
-    rows: list[list[str]]
+    rows: list[list[str]]  # of cells, without blanks about them
+    # a comma, semicolon or tab; with the latter two, a comma may be the decimal sign
     separator: str
 
     def number(self, row: list[str], column: int) -> float | None:

@@ -45,8 +45,7 @@ def find_inside(points: Sequence[Point], outlines: tuple[Outline, ...], hair: fl
             crossed = (y1 > py) != (y2 > py)
             ahead = px < x1 + (py - y1) * dx / np.where(dy == 0.0, 1.0, dy)
             odd ^= np.count_nonzero(crossed & ahead, axis=1) % 2 == 1
-    found: list[bool] = (odd | near).tolist()
-    return found
+    return (odd | near).tolist()
 
 
 def place_outline(
