@@ -43,12 +43,8 @@ def measure_in_turn(
 ) -> list[Measurement]:
     """Runs all methods alive at once, one run at a time: A B C, A B C, ...
 
-    Args:
-        reference: prepared and run once; gives the values that errors are measured against.
-        methods: without settings.
-        units: of the lattice.
-        limits: rounds, methods to skip, and stored figures.
-        tell: told of the progress, line by line.
+    `reference` is run once and gives the values that errors are measured against; the methods have
+    no settings.
 
     Raises:
         CandidateError: the reference could not be computed.

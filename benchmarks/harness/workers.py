@@ -56,9 +56,8 @@ class TooSlowError(CandidateError):
 class Worker:
     """Prepares a method, or several one after the other, in a process, and runs it on demand.
 
-    Args:
-        prepare: builds and compiles, from the arguments that come with each wish to prepare.
-        limit: processor time that a wish may take, s.
+    `prepare` takes the arguments of each wish to prepare; `limit` bounds a wish's processor time,
+    s.
     """
 
     def __init__(self, prepare: Callable[..., Run], limit: float = math.inf) -> None:

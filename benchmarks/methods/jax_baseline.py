@@ -123,11 +123,8 @@ def respond(
 def loss(scene: Scene, method: RungeKutta, times: Floats, measure: Mimicking) -> Loss:
     """Maps a design vector to the loss of the first load case, differentiable, and counts.
 
-    Args:
-        scene: the scene.
-        method: settings.
-        times: (n_times,) of the saved samples, s.
-        measure: the loss (1,) of motions (1, n_times, n_units, 3).
+    `times` (n_times,) are those of the saved samples, s; `measure` is the loss (1,) of motions (1,
+    n_times, n_units, 3).
     """
     of_design = parameters_of_design(scene)
     of_parameters = respond(scene, scene.loads.cases[0], method, jnp.asarray(times))

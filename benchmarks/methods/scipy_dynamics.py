@@ -26,12 +26,7 @@ APART = 3e-4
 
 
 class FirstOrderSystem:
-    """Integrates the free dofs of a case in time, y = (u, v), for scipy.
-
-    Args:
-        posed: the case; its drive must be harmonic.
-        values: parameters of the structure.
-    """
+    """Integrates the free dofs of a harmonically driven case in time, y = (u, v), for scipy."""
 
     def __init__(self, posed: LoadCase, values: ConcreteParameters) -> None:
         scene = posed.scene

@@ -158,11 +158,9 @@ def motions(
 ) -> list[Check]:
     """Integrates a motion and checks it, also against one of half the steps.
 
-    Args:
-        case: the case.
-        asked: times of the output, s, or how many from zero to the end.
-        error: that half the steps may find, root mean square relative to that of the motion.
-        solver: by default the plan's.
+    `asked` are times of the output, s, or how many from zero to the end; `error` is what half the
+    steps may find, root mean square relative to that of the motion. The solver is the plan's by
+    default.
 
     Raises:
         SimulationError: it cannot be integrated.
@@ -184,11 +182,6 @@ def motions(
 
 def motions_as_advised(case: StressScene, asked: Floats | int, error: float) -> list[Check]:
     """Integrates as planned by default; if that is not enough by its own account, tight.
-
-    Args:
-        case: the case.
-        asked: times of the output, or how many, as of ``motions``.
-        error: as of ``motions``.
 
     Raises:
         SimulationError: it cannot be integrated, or not without other changes.

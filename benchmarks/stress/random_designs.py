@@ -22,12 +22,8 @@ MOST_CUTS = 2000
 class RandomDesigns:
     """Draws shifts of all vertices of a lattice, cut back place by place until they can be made.
 
-    Args:
-        lattice: with no shift, it can be made.
-        frozen: units whose vertices stay.
-        largest: shift along x and y that is drawn at first, mm.
-        keep: share of its shift that a vertex keeps in each cut; near 1 the design ends at the
-            bounds.
+    The `frozen` units stay; `largest` is the shift along x and y drawn at first, mm; `keep` the
+    share that a vertex keeps in each cut: near 1 the design ends at the bounds.
     """
 
     def __init__(self, lattice: Lattice, frozen: Ints, largest: float, keep: float) -> None:

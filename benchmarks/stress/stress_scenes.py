@@ -90,15 +90,7 @@ def posed(
     motion: MotionLaw,
     **more: Any,  # noqa: ANN401
 ) -> StressScene:
-    """Clamps and drives units, in time unless the scene is said to be static.
-
-    Args:
-        lattice: at rest.
-        clamped: units that rest.
-        driven: units that follow the motion.
-        motion: of these.
-        **more: further fields of the scene; by default it lasts 1 s.
-    """
+    """Clamps and drives units, in time unless the scene is said to be static; it lasts 1 s."""
     every = np.arange(lattice.n_units)
     scene = Scene(
         Structure(lattice, MATERIAL, LAWS["angles"]),

@@ -61,12 +61,7 @@ def simulate_decay(
 
 
 def write_sets(asked: Calibration, path: Path, folder: Path) -> None:
-    """Writes the computed sets, and a calibration that names their files.
-
-    Args:
-        asked: the calibration.
-        path: its YAML.
-        folder: of the files.
+    """Writes the computed sets of a calibration, whose YAML is `path`, and one that names them.
 
     Raises:
         UserError: the folder cannot be written to.

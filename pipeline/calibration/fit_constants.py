@@ -34,11 +34,7 @@ AGREED = 0.2
 
 
 def fit_calibration(asked: Calibration, path: Path) -> Fit:
-    """Fits the constants of a calibration.
-
-    Args:
-        asked: the calibration.
-        path: its YAML; files are named as seen from there.
+    """Fits the constants of a calibration; `path` is its YAML, from which files are named.
 
     Raises:
         UserError: a file cannot be used, or the measured states cannot be simulated.

@@ -6,14 +6,10 @@ from sim.core import Floats
 
 
 def compute_reduction(before: Floats, after: Floats) -> Floats:
-    """Computes value and ends of the interval (3,) of 1 - after / before.
+    """Computes value and ends of the interval (3,) of 1 - after / before, of two such (3,).
 
     The distances of the ends from the values add up as those of independent errors do, to first
     order.
-
-    Args:
-        before: (3,) value, lower and upper end of what was measured without the cloak.
-        after: (3,) likewise with it.
     """
     first, first_low, first_high = before
     last, last_low, last_high = after

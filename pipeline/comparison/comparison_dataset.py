@@ -195,12 +195,7 @@ def _alignment(made: Compared) -> Variables:
 
 
 def describe_comparison(asked: Problem, made: Compared) -> dict[str, str]:
-    """Describes in words how the sides were brought together, and how the band was drawn.
-
-    Args:
-        asked: the problem, with the tolerances of the band.
-        made: the comparison.
-    """
+    """Describes in words how the sides were brought together, and how the band was drawn."""
     lag = made.axis.lag
     ambiguous = lag is not None and lag.ambiguous
     return {

@@ -42,13 +42,7 @@ class Sides(NamedTuple):
 
 
 def quantity_curve(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
-    """Computes a quantity along the frames (3 sides, frames, 3 estimates).
-
-    Args:
-        sides: of the comparison.
-        quantity: what is followed.
-        random: draws the copies of the measured side.
-    """
+    """Computes a quantity along the frames (3 sides, frames, 3 estimates)."""
     of, units = quantity.along, quantity.units
     out = np.full((3, len(sides.measured), 3), np.nan)
     for place, motion in enumerate(sides.motions):
@@ -133,11 +127,9 @@ def _smooth(sides: Sides) -> Floats:
 
 
 def band_coverage(sides: Sides, band: Floats) -> Floats:
-    """Computes the share (dofs,) of measurements in the band, widened by their noise.
+    """Computes the share (dofs,) of measurements in a band, widened by their noise.
 
-    Args:
-        sides: of the comparison.
-        band: (3, frames, units, dofs) of displacements.
+    The band (3, frames, units, dofs) is of displacements.
     """
     low, _, high = bands.widen_band(band, sides.sigma, sides.level)
     known = np.isfinite(sides.measured) & np.isfinite(low)

@@ -44,11 +44,7 @@ class Measurement(NamedTuple):
 
 
 def prepare_measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
-    """Prepares the measured side of a comparison.
-
-    Args:
-        track: of the recording.
-        design: as built.
+    """Prepares the measured side of a comparison: a track, and the design as built.
 
     Raises:
         UserError: the track is not of this design, shows no driven units, or is too short.

@@ -101,11 +101,7 @@ def _shift(pair: Pair) -> Floats:
 def align_in_time(pair: Pair, time: Floats) -> tuple[Pair, Floats]:
     """Delays the simulated side as much as the measured one, and tells by how much (dofs,), s.
 
-    The shift is NaN where the sides are so unlike that none is found.
-
-    Args:
-        pair: both sides.
-        time: (frames,) s.
+    `time` (frames,) is in s. The shift is NaN where the sides are so unlike that none is found.
     """
     most = float(np.ptp(time)) / _LONGEST
     total = np.zeros(pair.measured.shape[-1])
@@ -133,10 +129,7 @@ def _delay(pair: Pair, time: Floats, lag: Floats) -> Pair:
 def estimate_metrics(pair: Pair, time: Floats | None, random: np.random.Generator) -> Floats:
     """Computes value and ends of the interval (3, len(METRICS), dofs) of every metric.
 
-    Args:
-        pair: both sides.
-        time: (frames,) s; None for a quasi-static pair, which has no shift in time.
-        random: draws the copies.
+    `time` (frames,) is in s; a quasi-static pair has none, and no shift in time.
     """
     found = bootstrap(pair, compute_metrics, random)
     if time is None:

@@ -71,9 +71,7 @@ class RedrivenMotion(NamedTuple):
 def filter_held_motion(track: xr.Dataset, scene: Scene) -> HeldMotion:
     """Filters the motion of the driven units and of those clamped in all three dofs.
 
-    Args:
-        track: of the specimen; its displacement in the specimen's frame.
-        scene: of the structure.
+    The displacement of the track is in the specimen's frame.
 
     Raises:
         UserError: no driven unit was seen.
@@ -138,10 +136,7 @@ def drive_as_measured(scene: Scene, held: HeldMotion) -> Scene:
 def simulate_redriven(structure: PosedStructure, held: HeldMotion, times: Floats) -> RedrivenMotion:
     """Simulates the structure under the measured motion: in time, or as a path of equilibria.
 
-    Args:
-        structure: as designed, under the planned drives.
-        held: the measured motion.
-        times: (n_times,) on the track's clock, ascending, s.
+    `times` (n_times,) are on the track's clock, ascending, s.
     """
     scene, vertices = structure
     driven = drive_as_measured(scene, held)

@@ -65,9 +65,7 @@ def register(design: Floats, measured: Floats) -> Registration:
 def measure_places(track: xr.Dataset, design: Floats) -> Floats:
     """Computes the places of the units at rest (units, 2) by the camera, mm; NaN if unseen.
 
-    Args:
-        track: with its camera.
-        design: (units, 2) where they should be, NaN for those that are absent.
+    `design` (units, 2) is where they should be, NaN for those that are absent.
     """
     measured = np.full_like(design, np.nan)
     camera, missed = camera_of(track), track["camera_residual"].values

@@ -35,13 +35,8 @@ def simulate_specimen(
 ) -> SimulatedSide:
     """Simulates a structure and imperfect copies of it as the specimen was driven.
 
-    Args:
-        asked: the problem, with the tolerances.
-        structure: as designed.
-        track: in the design's frame.
-        times: (frames,) on the track's clock, s.
-        way: (2,) direction of the drive.
-        threads: copies simulated side by side.
+    The track is in the design's frame; `times` (frames,) are on its clock, s; `way` (2,) is the
+    direction of the drive.
 
     Raises:
         UserError: no driven unit was seen.

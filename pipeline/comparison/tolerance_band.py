@@ -43,15 +43,10 @@ def sample_specimens(
     case: int = 0,
     threads: int = 1,
 ) -> Specimens:
-    """Draws and simulates specimens of a structure.
+    """Draws and simulates specimens of a structure, as many and as far off as the problem asks for.
 
-    Args:
-        asked: the problem, with how many to draw and how far they may be off.
-        structure: as designed, under the planned drives.
-        times: (n_times,) of the output, ascending, s.
-        held: the measured motion to drive them by in place of a planned one.
-        case: number of the planned load case.
-        threads: specimens simulated side by side.
+    `times` (n_times,) are those of the output, ascending, s; `held` is the measured motion that
+    drives them in place of the planned one of a load case.
 
     Raises:
         SimulationError: the structure as designed cannot be simulated.

@@ -39,14 +39,11 @@ def of_study(
     parents: Mapping[str, Path] | None = None,
     plan: object = None,
 ) -> dict[str, str]:
-    """Records the provenance of a dataset that `stage` makes.
+    """Records the provenance of a dataset that a stage makes of a problem.
 
-    Args:
-        problem: the problem; as much of it as the stage depends on is stored in full.
-        stage: the stage, by its name in the table.
-        method: the optimisation method, where the stage runs only one.
-        parents: files that the stage read, by role.
-        plan: what was decided and skipped; anything that JSON can hold.
+    As much of the problem as the stage (and its one optimisation method) depends on is stored in
+    full. `parents` are files that it read, by role; `plan` is what was decided and skipped:
+    anything that JSON can hold.
     """
     return {
         "problem": canonical_json(problem, stage, method),
@@ -61,11 +58,8 @@ def of_recording(
 ) -> dict[str, str]:
     """Records the provenance of what is made of a recording or of a calibration's measurements.
 
-    Args:
-        description: its YAML as JSON.
-        parents: files that were read, by role; the hash of a folder is that of its files.
-        synthetic: whether it was rendered or computed.
-        role: what it describes.
+    `description` is its YAML as JSON; `parents` are files that were read, by role: the hash of a
+    folder is that of its files.
     """
     return {role: description, "synthetic": "yes" if synthetic else "no", **_made_from(parents)}
 
@@ -81,13 +75,7 @@ def _made_from(parents: Mapping[str, Path]) -> dict[str, str]:
 
 
 def check_parent(made: xr.Dataset, file: Path, role: str, parent: Path) -> None:
-    """Refuses a dataset that was made from another file than the one beside it.
-
-    Args:
-        made: the dataset.
-        file: its file.
-        role: what the other is to it.
-        parent: the other.
+    """Refuses a dataset that was made from another file than the one beside it, its `role`.
 
     Raises:
         UserError: it tells of another file, or of none.

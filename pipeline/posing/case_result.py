@@ -96,10 +96,7 @@ def measure(
 ) -> Measure[CaseResult]:
     """Builds the function that reduces the cases of a structure.
 
-    Args:
-        structure: the structure.
-        times: when its motion was asked for.
-        intact: the cases of the structure to be mimicked, if one was simulated.
+    `intact` are the cases of the structure to be mimicked, if one was simulated.
     """
     scene, vertices = structure
     stride = 1 if scene.loads.static else CLEARANCE_STRIDE

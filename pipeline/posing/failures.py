@@ -57,13 +57,7 @@ class SimulatedStructure(NamedTuple):
 def simulation_failure(
     error: SimulationError, tried: SimulatedStructure, kept: Path | None
 ) -> UserError:
-    """Explains that a structure's motion could not be followed to its end.
-
-    Args:
-        error: the solver's.
-        tried: what was to be simulated; times of a static structure are load parameters.
-        kept: the dataset that holds what was computed, if there is one.
-    """
+    """Explains that a structure's motion could not be followed to its end; `kept` has what was."""
     scene = tried.scene
     what = f"the {tried.name} structure cannot be simulated"
     if scene.loads.static and error.step is not None:

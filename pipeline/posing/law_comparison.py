@@ -34,10 +34,6 @@ def by_contact(
     """Compares loss, overlaps, smallest gap and snaps of static structures under either law.
 
     NaN in studies of motion in time, and where a structure cannot be simulated under a law.
-
-    Args:
-        structures: by name.
-        laws: by LAWS.
     """
     found = np.array(
         [

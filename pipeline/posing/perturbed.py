@@ -66,11 +66,8 @@ def drawn(
 ) -> tuple[Scene, PerturbedStructure]:
     """Draws one copy of a structure: the scene with its constants, and its vertices.
 
-    Args:
-        scene: of the structure as designed.
-        vertices: (n_vertices, 2) of the design, mm.
-        asked: how far things may be off, as shares or as sizes.
-        seed: equal seeds give equal copies, whatever else is drawn.
+    `vertices` (n_vertices, 2) are the design's, mm; equal seeds give equal copies, whatever else is
+    drawn.
     """
     sizes = _sizes(asked, scene.lattice.spacing) if isinstance(asked, Tolerances) else asked
     of = scene.structure
@@ -92,14 +89,9 @@ def _sizes(asked: Tolerances, spacing: float) -> Perturbation:
 def simulate(
     scene: Scene, vertices: Floats, asked: Robustness, samples: Sequence[int], threads: int
 ) -> xr.Dataset:
-    """The dataset ``scatter`` of some of the copies.
+    """The dataset ``scatter`` of some of the copies, by their numbers, of a scene's shipped design.
 
-    Args:
-        scene: of the structure to copy.
-        vertices: (n_vertices, 2) its shipped design.
-        asked: what to draw.
-        samples: numbers of the copies to draw of each kind.
-        threads: copies simulated side by side.
+    `vertices` (n_vertices, 2) are the design's, mm.
     """
     target = None if scene.objective.reference is None else target_motion(scene, threads)
     parts = []

@@ -38,14 +38,7 @@ Table = dict[str, list[CaseResult]]
 def assemble_response(
     asked: Problem, structures: dict[str, PosedStructure], times: Floats, measured: Table
 ) -> xr.Dataset:
-    """Assembles the dataset ``response``.
-
-    Args:
-        asked: the problem.
-        structures: by name, in the order of the dataset.
-        times: (n_times,) of the samples shown, s.
-        measured: the cases of each structure.
-    """
+    """Assembles the dataset ``response``; `times` (n_times,) are those of the samples shown, s."""
     scene = structures["altered"].scene
     variables = {
         **network_variables(asked, scene),

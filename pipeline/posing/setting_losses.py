@@ -28,14 +28,7 @@ class UnposedError(ValueError):
 def results(
     asked: Problem, setting: Setting, folder: Path, design: xr.Dataset, threads: int
 ) -> list[SweepResult]:
-    """Simulates every load case of a problem with a setting laid over it.
-
-    Args:
-        asked: the problem, whose files lie in ``folder``.
-        setting: what to change.
-        folder: see there.
-        design: the design.
-        threads: load cases simulated side by side.
+    """Simulates every load case of a problem, its files in `folder`, with a setting laid over it.
 
     Raises:
         UnposedError: the setting makes no problem, or one that the design does not fit.

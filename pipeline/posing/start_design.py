@@ -25,11 +25,7 @@ def shipped_vector(design: xr.Dataset) -> Floats:
 def start_vector(asked: Problem, scene: Scene, path: Path | None, source: Path) -> Floats | None:
     """Reads the design vector (n_variables,) that an optimisation starts from, if it has one.
 
-    Args:
-        asked: the problem.
-        scene: its scene.
-        path: a design, where the problem starts from one.
-        source: the problem's file.
+    `path` is a design, where the problem starts from one; `source` is the problem's file.
 
     Raises:
         UserError: a design is wanted and not given, or given and not wanted, or it is one of other

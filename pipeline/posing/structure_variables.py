@@ -68,12 +68,7 @@ def design_hash(design: xr.Dataset) -> str:
 
 
 def present_ligaments(network: xr.Dataset, structure: str = "cloaked") -> NDArray[np.bool_]:
-    """Selects the ligaments (n_ligaments,) of the intact network that a structure has.
-
-    Args:
-        network: a design or a response.
-        structure: intact, altered or cloaked.
-    """
+    """Selects the ligaments (n_ligaments,) that a structure of a design or a response has."""
     gone = (network["region"].values == VOID) & (structure != "intact")
     place = np.searchsorted(network["unit"].values, network["ligament_unit"].values)
     return ~gone[place].any(axis=1)

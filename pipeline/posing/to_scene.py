@@ -78,12 +78,7 @@ def altered_lattice_of(problem: Problem) -> Lattice:
 def scene_of(
     problem: Problem, folder: Path, motions: tuple[loads.MotionLaw, ...] | None = None
 ) -> Scene:
-    """Poses the scene of a problem whose files lie in ``folder``.
-
-    Args:
-        problem: the problem.
-        folder: where the problem's own files (a measured drive) are.
-        motions: drives to use in place of the problem's load cases.
+    """Poses the scene of a problem whose files lie in ``folder``, or with other ``motions``.
 
     Raises:
         UserError: the file of a measured drive cannot be read, or the scene has no meaning.

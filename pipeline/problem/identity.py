@@ -16,10 +16,8 @@ REPORT = "report"
 def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = None) -> str:
     """The problem in working units as JSON with sorted keys: equal problems, equal bytes.
 
-    Args:
-        problem: the problem.
-        stage: leave out what this stage of the table does not depend on; `REPORT` needs all.
-        method: also leave out the other optimisation methods.
+    What a stage of the table does not depend on is left out (`REPORT` needs all), and so are the
+    other optimisation methods than one that is given.
     """
     data = problem.model_dump(mode="json", by_alias=True, exclude_none=True)
     for name in () if stage == REPORT else STAGES[stage].unused or ():

@@ -47,11 +47,7 @@ _DIMENSIONS = {
 
 
 def over_measured_constants(asked: Problem, folder: Path) -> Problem:
-    """Replaces the sweep of a problem by one over the constants that its report names.
-
-    Args:
-        asked: a problem whose report names measured constants.
-        folder: of its file.
+    """Replaces the sweep of a problem by one over the measured constants that its report names.
 
     Raises:
         UserError: the file cannot be used, or has fewer draws than are asked for.

@@ -31,12 +31,9 @@ _COMMON = (
 
 
 def parser(command: str, description: str, *, study: bool = True) -> argparse.ArgumentParser:
-    """Makes a command line with the options that all commands share.
+    """Makes a command line (`python -m command`) with the options that all commands share.
 
-    Args:
-        command: what is typed, after `python -m`.
-        description: what it reads, does and writes.
-        study: whether it wants --problem and --preset.
+    `study` tells whether it wants --problem and --preset.
     """
     return _framed(f"python -m {command}", description, study=study)
 

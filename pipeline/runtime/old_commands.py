@@ -45,11 +45,6 @@ class _OldCommands(MetaPathFinder, InspectLoader):
 
 
 def keep_old_commands(package: str, commands: Mapping[str, str]) -> None:
-    """Lets `python -m package.old` run the command `new` of a package, with a note.
-
-    Args:
-        package: the package, whose `__main__` has a `main` that takes words.
-        commands: the commands by names of former modules, without the package.
-    """
+    """Lets `python -m package.old` run the command `new` of a package, with a note."""
     if not INSTALLED:  # as a package it had none
         sys.meta_path.append(_OldCommands(package, commands))

@@ -25,12 +25,9 @@ _LINES_PER_JOB = 10
 class Progress:
     """Counts the steps of a job and tells about them, with figures such as loss and violation.
 
-    Args:
-        total: number of steps.
-        label: what is going on, in a few words.
-        initial: steps done before this start, when a job is resumed.
-        bar: whether to draw a bar; by default on a terminal, if `pipeline.runtime.cli` may talk to
-        it. clock: the time in seconds; by default it stands still while loops are compiled.
+    A resumed job has done `initial` steps before. A bar is drawn, by default, on a terminal if
+    `pipeline.runtime.cli` may talk to it. The clock, in seconds, by default stands still while
+    loops are compiled.
     """
 
     def __init__(

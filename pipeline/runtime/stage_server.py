@@ -67,9 +67,7 @@ def start(module: str = __name__) -> None:
 def delegate(program: str, imports: str) -> int | None:
     """Has the server run `python -m program` with this process's arguments.
 
-    Args:
-        program: the module to run.
-        imports: module that the server imports first, for this stage and those after it.
+    It imports the module `imports` first, for this stage and those after it.
 
     Returns:
         The exit code; None where there is no server: the caller does the work.

@@ -47,11 +47,6 @@ def work(args: argparse.Namespace) -> None:
 def dataset(asked: Problem, held: dict[str, PosedStructure], recording: Recording) -> xr.Dataset:
     """The dataset ``specimen``: what a recording's specimen does under its load case.
 
-    Args:
-        asked: the problem.
-        held: the structures as designed, by name.
-        recording: which of them is made, how, and under which case.
-
     Raises:
         UserError: the recording has no specimen, or it cannot be made or simulated.
     """

@@ -25,12 +25,7 @@ class NestedPolygons(NamedTuple):
 
 
 def coverage_image(rings: NestedPolygons, shape: tuple[int, int]) -> Floats:
-    """Averages the shade (rows, columns) over each pixel; pixel (0, 0) reaches from -0.5 to 0.5.
-
-    Args:
-        rings: in pixels.
-        shape: rows and columns.
-    """
+    """Averages the shade (rows, columns) over each pixel; pixel (0, 0) reaches from -0.5 to 0.5."""
     change = np.zeros((shape[0], shape[1] + 2))
     _accumulate(rings.points + 0.5, rings.start, rings.shade, change)
     return np.cumsum(change, axis=1)[:, : shape[1]]

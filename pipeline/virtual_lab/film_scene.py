@@ -40,9 +40,7 @@ class _Layer(NamedTuple):
 def nested_polygons(scene: FilmScene, pose: Floats) -> NestedPolygons:
     """Projects all polygons to pixels, with the shades they add to the board's.
 
-    Args:
-        scene: what is filmed.
-        pose: (units, 3) displacements in mm and rotations in rad.
+    `pose` (units, 3) are displacements in mm and rotations in rad.
     """
     look = scene.look
     corners = _placed(scene.specimen.outline, np.arange(len(pose)), pose, scene.specimen.centre)

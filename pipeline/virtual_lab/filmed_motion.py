@@ -57,14 +57,10 @@ def film_clock(given: Floats, asked: VirtualRecording) -> FilmClock:
 
 
 def sample_motion(one: xr.Dataset, present: Mask, asked: VirtualRecording) -> FilmedMotion:
-    """Samples the motion of a structure under one load case by the frames.
+    """Samples the motion of a response at one structure and case, or of a specimen, by the frames.
 
     Between the samples of the response, a cubic spline; before the start, its first state.
-
-    Args:
-        one: a response at one structure and one case, or a specimen.
-        present: (units,) which are there.
-        asked: rate, window and exposure.
+    `present` (units,) are there.
 
     Raises:
         UserError: nothing is in the window.
@@ -96,11 +92,6 @@ def load_cell_log(one: xr.Dataset, asked: VirtualRecording, cell: VirtualLoadCel
 
     A force is positive where the drive pushes along its direction. The log begins at zero of its
     clock and ends a little after the video.
-
-    Args:
-        one: a response at one structure and one case, or a specimen.
-        asked: the set-up of the video.
-        cell: the load cell.
 
     Raises:
         UserError: the video shows nothing of the response.

@@ -43,13 +43,9 @@ class VirtualFilm(NamedTuple):
 def prepare_film(
     one: xr.Dataset, structure: str, kind: str, asked: VirtualRecording
 ) -> VirtualFilm:
-    """Prepares the film of a structure under one load case.
+    """Prepares the film of a structure under one load case: a response at both, or a specimen.
 
-    Args:
-        one: a response at one structure and one case, or a specimen.
-        structure: intact, altered or cloaked.
-        kind: dots, speckle or bare (as is "auto").
-        asked: the set-up.
+    `kind` is dots, speckle or bare (as is "auto").
 
     Raises:
         UserError: the specimen is out of the picture, or nothing is in the window of time.
@@ -113,14 +109,7 @@ def _ligaments(response: xr.Dataset, structure: str, ids: Ints) -> Ints:
 def assemble_truth(
     response: xr.Dataset, present: Mask, motion: FilmedMotion, view: Viewpoint
 ) -> xr.Dataset:
-    """Makes the dataset ``truth``: displacements at mid-exposure, as a track would have them.
-
-    Args:
-        response: of one structure under one load case.
-        present: (units,) which are there.
-        motion: what was filmed of them.
-        view: the camera.
-    """
+    """Makes the dataset ``truth``: displacements at mid-exposure, as a track would have them."""
     displacement = np.full((len(motion.time), len(present), 3), np.nan)
     displacement[:, present] = motion.pose
     variables = {
@@ -144,14 +133,9 @@ def assemble_truth(
 def sensor_frame(
     scene: FilmScene, instants: Floats, time: float, index: int, asked: VirtualRecording
 ) -> Image:
-    """Renders the picture (rows, columns) that the sensor gives, 8 bit.
+    """Renders the picture (rows, columns) that the sensor gives, 8 bit, at a time in s.
 
-    Args:
-        scene: what is filmed.
-        instants: (instants, units, 3) poses that the exposure averages.
-        time: of the frame, s.
-        index: of the frame: the noise of each is its own.
-        asked: light, sensor and seed.
+    The exposure averages `instants` (instants, units, 3); the noise of each frame is its own.
     """
     shades = np.mean([shade_image(scene, pose, asked.sensor.blur) for pose in instants], axis=0)
     light = _light(asked.light, shades.shape)

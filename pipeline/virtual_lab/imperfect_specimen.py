@@ -61,13 +61,7 @@ def _left(vector: Numbers) -> Numbers:
 def make_specimen(
     structure: PosedStructure, case: int, asked: SpecimenFaults, end: float
 ) -> PosedStructure:
-    """Draws a specimen of a structure under one of its load cases.
-
-    Args:
-        structure: as designed.
-        case: number of the load case.
-        asked: in what the specimen differs.
-        end: of its motion, s.
+    """Draws a specimen of a structure under one of its load cases, whose motion ends at `end`, s.
 
     Raises:
         UserError: its units would overlap.
@@ -90,14 +84,9 @@ def make_specimen(
 def imperfect_drive(
     scene: Scene, case: int, asked: DriveFaults, end: float, unload: bool
 ) -> ImperfectDrive:
-    """Makes the drive of a load case as the specimen has it.
+    """Makes the drive of a load case as the specimen has it, up to the `end`, s.
 
-    Args:
-        scene: of the structure.
-        case: number of the load case.
-        asked: in what the drive differs.
-        end: of the motion, s.
-        unload: whether the load is taken off again in the second half.
+    `unload` takes the load off again in the second half.
     """
     planned = scene.loads.motions[case]
     path = np.asarray(planned(np.linspace(0, scene.loads.duration, SAMPLES)))[:, :2]

@@ -18,14 +18,10 @@ _TICKS = 90000  # per second: a usual clock of containers
 def encode_video(
     path: Path, images: Iterable[Image], rate: float, codec: Codec, labels: dict[str, str]
 ) -> None:
-    """Writes the video, whole or not at all.
+    """Writes the video, whole or not at all; its name should have one of the codec's `suffixes`.
 
-    Args:
-        path: the file; its name should have one of the codec's `suffixes`.
-        images: grey, (rows, columns), or in colour, (rows, columns, 3), which ffv1 does not take.
-        rate: frames per second.
-        codec: how to store them.
-        labels: metadata of the file: title, comment.
+    Images are grey, (rows, columns), or in colour, (rows, columns, 3), which ffv1 does not take;
+    the rate is in frames per second; labels are the file's title and comment.
     """
     with (
         write_atomically(path) as aside,

@@ -17,12 +17,9 @@ _told = facts_of(__file__)
 def constants_facts(
     asked: Problem, made: xr.Dataset | None, nominal: tuple[float, float]
 ) -> Iterator[Fact]:
-    """Yields mean and 95 % of losses and of their reduction over the constants.
+    """Yields mean and 95 % of losses and of their reduction over the constants, if there are any.
 
-    Args:
-        asked: the problem.
-        made: the losses over measured constants; none yields nothing.
-        nominal: loss of the altered structure and of the design, at the problem's own constants.
+    `nominal` are losses of the altered structure and of the design, at the problem's own constants.
     """
     if made is None:
         return

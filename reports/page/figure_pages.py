@@ -46,17 +46,10 @@ def figure_page(
     draft: Sequence[str] = (),
     parents: Sequence[str] = (),
 ) -> Report:
-    """Returns the report.
+    """Returns the report of a dataset, whose name the figure's files bear too.
 
-    Args:
-        name: of the figure's files, and of the dataset's.
-        text: what the page says.
-        figure: makes the figure.
-        tables: written as CSV beside the page.
-        data: the dataset, whose attributes tell where it is from.
-        shown: the table on the page, if there is one.
-        draft: why this is but a draft, if it is one.
-        parents: other datasets of the study that it came from.
+    `shown` is the table on the page, if there is one; `draft` tells why this is but a draft, if it
+    is one; `parents` are other datasets of the study that it came from.
     """
     values = {
         **text._asdict(),

@@ -93,15 +93,9 @@ def study_page(
 ) -> Report:
     """Returns the report of studies, of which everything else has been made.
 
-    Args:
-        name: of the figure's files; the paper's claims on it are judged.
-        studies: by what their datasets are called beside others'; a single one needs no such name.
-        text: what the page says of itself.
-        facts: all numbers, as the page groups them.
-        tables: beside the page, and inside it as downloads.
-        figure: makes it.
-        animation: what the page's player shows.
-        together: what builds all studies and the problem that asks for them, where one does.
+    The paper's claims on the figure of that name are judged. Studies are named as their datasets
+    are called beside others'; a single one needs no name. `together` is what builds all studies and
+    the problem that asks for them, where one does.
     """
     player, single = payload(animation), "" in studies
     several = list(studies.values())

@@ -14,12 +14,7 @@ _TEMPLATES = Path(__file__).parent / "templates"
 
 
 def rendered(template: str, values: Mapping[str, Any]) -> str:
-    """Returns HTML of a template.
-
-    Args:
-        template: name of its file.
-        values: what it shows, by name.
-    """
+    """Returns HTML of a template, by the name of its file."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_TEMPLATES),
         autoescape=True,

@@ -55,11 +55,8 @@ def clips(
 ) -> list[AnimationClip]:
     """Forms clips of the recordings of one structure, each under its own case, with residual.
 
-    Args:
-        recordings: of the structure; a second one of the same load case is a clip of its own.
-        simulated: what stands beside them.
-        wanted: (n_frames,) where along the course.
-        spacing: of the lattice, mm.
+    A second one of the same load case is a clip of its own; `wanted` (n_frames,) is where along the
+    course.
     """
     trials: list[dict[int, RecordedMotion]] = []
     for each in recordings:

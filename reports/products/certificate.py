@@ -101,11 +101,7 @@ def _harmonic(data: xr.Dataset) -> bool:
 
 
 def draw_certificate(data: xr.Dataset) -> Figure:
-    """Draws the figure at two-column width.
-
-    Args:
-        data: the certificate.
-    """
+    """Draws the figure at two-column width."""
     figure = style.page(_TOP + _HIGH + 11.0)
     style.letter(figure, 1.0, 1.0, "a", "Loss under random loads")
     style.letter(figure, 88.0, 1.0, "b", "Loss of the design, load by load")

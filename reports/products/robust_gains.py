@@ -46,11 +46,7 @@ def _row(data: xr.Dataset) -> tuple[str, ...]:
 
 
 def draw_robust_gains(data: xr.Dataset) -> Figure:
-    """Draws the figure at two-column width.
-
-    Args:
-        data: the gains.
-    """
+    """Draws the figure at two-column width."""
     high = _ROW * data.sizes["preset"]
     figure = style.page(16.0 + high + 11.0)
     style.letter(figure, 1.0, 1.0, "a", "Loss under what the preset asks for")

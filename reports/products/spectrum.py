@@ -51,12 +51,7 @@ def _columns(values: xr.DataArray) -> dict[str, list[object]]:
 
 
 def draw_spectrum(data: xr.Dataset, asked: Problem) -> Figure:
-    """Draws the figure at two-column width.
-
-    Args:
-        data: the spectrum.
-        asked: its problem.
-    """
+    """Draws the figure at two-column width."""
     names = list(data["structure"].values)
     below = _TOP + len(names) * _ROW + 3.0
     figure = style.page(below + 66.0)

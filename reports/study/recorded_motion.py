@@ -56,9 +56,7 @@ class RecordedMotion:
     def at(self, variable: xr.DataArray, wanted: Floats) -> Floats:
         """Interpolates a variable (time, ...) of the dataset; NaN where nothing was recorded.
 
-        Args:
-            variable: one of the dataset.
-            wanted: where along the course, in the unit of `along`.
+        `wanted` is where along the course, in the unit of `along`.
         """
         values = self.values(variable)
         slack = _BEYOND * (float(np.max(wanted)) - float(self.along[0]))
@@ -72,9 +70,7 @@ class RecordedMotion:
     def motion(self, response: xr.Dataset, wanted: Floats) -> xr.Dataset:
         """Returns the measured motion in the form of a response of one structure and one case.
 
-        Args:
-            response: of the study.
-            wanted: where along the course; these are its `time`.
+        `wanted` is where along the course; these are its `time`.
         """
         part = response.sel(structure=self.structure).isel(case=[self.case], time=slice(0, 0))
         part = part.drop_vars([name for name in part.data_vars if "time" in part[name].dims])

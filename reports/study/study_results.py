@@ -169,12 +169,6 @@ def load_built(
 ) -> StudyResults:
     """Finds the study of a problem file, its datasets where the workflow puts them below `results`.
 
-    Args:
-        path: the problem file.
-        preset: one of its presets.
-        results: the folder of all results.
-        recordings: names of those that are shown.
-
     Raises:
         UserError: as for `load`.
     """

@@ -112,10 +112,8 @@ class _HeldCourses:
 def smooth_drive(track: xr.Dataset, scene: Scene, bias: Floats) -> SmoothedDrive:
     """Smooths the motion of the held units of a track, which begins at rest.
 
-    Args:
-        track: of the specimen, in the design's frame.
-        scene: of the structure under its planned drive.
-        bias: (3,) standard deviation of what stays with a unit through all frames: mm, mm, rad.
+    The track is in the design's frame, the scene under its planned drive; `bias` (3,) is the
+    standard deviation of what stays with a unit through all frames: mm, mm, rad.
 
     Raises:
         UserError: no driven unit was seen.

@@ -70,9 +70,7 @@ def _separator(lines: list[str]) -> str:
 def read_columns(path: Path, names: Iterable[str]) -> Floats:
     """Reads the named columns (lines, names) as they are; lines with gaps are left out.
 
-    Args:
-        path: a CSV; lines above its heading are comments.
-        names: of the columns.
+    Lines above the heading are comments.
 
     Raises:
         UserError: no such file, no such column, or no numbers in them.
@@ -90,12 +88,10 @@ def read_columns(path: Path, names: Iterable[str]) -> Floats:
 
 
 def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: int = 1) -> Floats:
-    """Reads the named columns (lines, names) in working units.
+    """Reads the named columns (lines, names) in working units, of at least so many lines.
 
-    Args:
-        path: a CSV whose heading names every column as `NAME (UNIT)`; lines above it are comments.
-        wanted: names and what they are; the units may stand in the line below the names.
-        least: number of lines below the heading that are needed.
+    The heading names every column as `NAME (UNIT)`, or the units stand in the line below the names;
+    lines above it are comments.
 
     Raises:
         UserError: no such file or column, no unit or a wrong one, too few lines, or a line without

@@ -41,15 +41,11 @@ FARTHEST = 1e9
 def read_outlines(
     path: Path, *, threshold: float | None = None, invert: bool = False
 ) -> tuple[Outline, ...]:
-    """Reads closed outlines of an image's shape, y up, in pixels or the drawing's own unit.
+    """Reads closed outlines of the shape in a PNG, JPG or SVG, y up, in pixels or the file's unit.
 
-    A point within an odd number of them lies in the shape.
-
-    Args:
-        path: of a PNG, JPG or SVG.
-        threshold: grey level from 0 of black to 1 of white below which a pixel is in the shape; an
-            image must be binary without it.
-        invert: whether what is light is the shape.
+    A point within an odd number of them lies in the shape. A pixel is in it below the `threshold`,
+    a grey level from 0 of black to 1 of white; without it, an image must be binary. `invert` takes
+    what is light.
 
     Raises:
         UserError: no such file, unreadable, not binary, or without a shape.

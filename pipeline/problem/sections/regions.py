@@ -65,8 +65,7 @@ class Region(Section):
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
         """Draws closed outlines, mm; a point within an odd number of them lies in the region.
 
-        Args:
-            middle: of the lattice, for shapes that are centred there.
+        Some shapes are centred in the `middle` of the lattice.
         """
         if self.bounds is not None:
             centre, _, radius = self.bounds

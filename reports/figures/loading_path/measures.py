@@ -139,8 +139,8 @@ def reaction(response: xr.Dataset) -> xr.DataArray:
 def reaction_error(force: xr.DataArray) -> xr.DataArray:
     """Computes how far forces of structures are off the intact one's, relative to its last.
 
-    Args:
-        force: (structure, case, time) of `reaction`, N; root mean squares are over the time.
+    The forces (structure, case, time) are those of `reaction`, N; root mean squares are over the
+    time.
     """
     intact = force.sel(structure="intact")
     squares: xr.DataArray = ((force - intact) ** 2).mean("time")

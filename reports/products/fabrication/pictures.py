@@ -81,9 +81,7 @@ def assembled(path: Path, colour: str) -> bytes:
 def prebend_map(path: Path, shims: Collection[Mapping[str, Any]]) -> bytes:
     """Returns PNG of the specimen's outlines, its shims coloured by their strain before any load.
 
-    Args:
-        path: of the assembled specimen.
-        shims: middle and strain of each, as the manifest has them.
+    The manifest has middle and strain of each shim.
     """
     solid = read_stl(path)
     low, high = solid.extent

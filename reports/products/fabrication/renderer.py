@@ -44,12 +44,9 @@ class View:
 
 
 def picture(bodies: list[Body], width: int, elevation: float = ELEVATION) -> Image:
-    """Returns image (height, width, 3) of bodies on white.
+    """Returns image (height, width, 3) of bodies on white; the width is in pixels.
 
-    Args:
-        bodies: what is seen.
-        width: of the image in pixels; the height follows.
-        elevation: of the eye above the horizon, degrees; 90 looks straight down.
+    The eye is at an elevation above the horizon, degrees; 90 looks straight down.
     """
     azimuth = AZIMUTH if elevation < 90.0 else -90.0
     view, shape = _fitted(bodies, _axes(azimuth, elevation), width * _SAMPLES)

@@ -35,13 +35,7 @@ _CLOCK = (260, 40)
 
 
 def images(reel: Animation, title: str, note: str) -> Iterator[Image]:
-    """Yields the frames (rows, columns, 3), at the first of the reel's speeds.
-
-    Args:
-        reel: what plays.
-        title: stands above.
-        note: stands below.
-    """
+    """Yields the frames (rows, columns, 3), at the first of the reel's speeds."""
     placed = layout(reel)
     still = background(reel, placed, title, note)
     large = still.repeat(_FINER, axis=0).repeat(_FINER, axis=1)

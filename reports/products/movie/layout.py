@@ -77,14 +77,7 @@ def _extent(clips: Sequence[AnimationClip]) -> tuple[NDArray[np.float64], NDArra
 
 
 def background(reel: Animation, placed: MovieLayout, title: str, note: str) -> Image:
-    """Returns a frame (rows, columns, 3) with the words and the bar of colours.
-
-    Args:
-        reel: what plays.
-        placed: its layout.
-        title: of the movie.
-        note: below the structures.
-    """
+    """Returns a frame (rows, columns, 3) with the words and the bar of colours."""
     with style.styled():
         figure = Figure(figsize=(WIDTH / DPI, HEIGHT / DPI), dpi=DPI)
         _write(

@@ -49,12 +49,7 @@ def measures(data: xr.Dataset) -> list[SweepMeasure]:
 
 
 def draw_sweep(data: xr.Dataset, sweep: Sweep) -> Figure:
-    """Draws the figure at two-column width.
-
-    Args:
-        data: the dataset of the sweep.
-        sweep: what asked for it.
-    """
+    """Draws the figure at two-column width."""
     along, shown = cases.axes(data), measures(data)
     if cases.mapped(sweep):
         return _maps(data, along, shown)

@@ -46,12 +46,7 @@ class Painter(NamedTuple):
 
 
 def painter(track: xr.Dataset, shown: str) -> Painter:
-    """Returns the painter of a track.
-
-    Args:
-        track: the dataset.
-        shown: displacement (its size) or rotation.
-    """
+    """Returns the painter of a track, which shows displacement (its size) or rotation."""
     specimen = of_track(track)
     there = np.isin(track["unit"].values, specimen.ids)
     pose = track["displacement"].transpose("time", "unit", "dof").values[:, there]

@@ -61,13 +61,7 @@ class TrackQuality(NamedTuple):
 
 
 def measured(track: xr.Dataset, images: Iterable[Image], stream: StreamProperties) -> TrackQuality:
-    """Measures of a track.
-
-    Args:
-        track: the dataset.
-        images: frames of its video.
-        stream: of its video.
-    """
+    """Measures a track: `images` are frames of its video, `stream` tells how that holds them."""
     pose = track["displacement"].transpose("time", "unit", "dof").values
     sigma = track["sigma"].transpose("time", "unit", "dof").values
     specimen = of_track(track)
