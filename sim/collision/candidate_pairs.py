@@ -17,23 +17,14 @@ MARGIN = 1 / 15
 
 @dataclass(frozen=True)
 class CandidatePairs:
-    """Holds units as polygons, and the pairs of them that the tangent couples.
+    """Holds units as polygons, and the pairs of them that the tangent couples."""
 
-    Attributes:
-        pairs: (n_pairs, 2) units, ascending.
-        first: (n_units + 1,) start of each polygon in the vertices.
-        following: (n_vertices,) the counter-clockwise neighbour of each vertex.
-        distance: activation distance, mm.
-        length: mean length of the ligaments, mm.
-        reach: distance within which units are watched, mm.
-    """
-
-    pairs: Ints
-    first: Ints
-    following: Ints
-    distance: float
-    length: float
-    reach: float
+    pairs: Ints  # (n_pairs, 2) units, ascending
+    first: Ints  # (n_units + 1,) start of each polygon in the vertices
+    following: Ints  # (n_vertices,) the counter-clockwise neighbour of each vertex
+    distance: float  # activation distance, mm
+    length: float  # mean length of the ligaments, mm
+    reach: float  # distance within which units are watched, mm
 
     @property
     def owner(self) -> Ints:

@@ -98,23 +98,14 @@ def _outward(ring: Array) -> Array:
 
 @dataclass(frozen=True)
 class ConstraintKind:
-    """One kind of requirement: ``sign * (measure - limit) >= 0`` at every place.
+    """One kind of requirement: ``sign * (measure - limit) >= 0`` at every place."""
 
-    Attributes:
-        name: as in the reports.
-        unit: of the measure and its margin.
-        measure: function of the place's points.
-        places: (n_places, ...) ids of those points, vertices and angles of slots.
-        limit: bound of the measure.
-        sign: 1 if the bound is a smallest, -1 if it is a largest value.
-    """
-
-    name: str
-    unit: str
-    measure: Callable[[Array], Array]
-    places: Ints
-    limit: float
-    sign: int = 1
+    name: str  # as in the reports
+    unit: str  # of the measure and its margin
+    measure: Callable[[Array], Array]  # function of the place's points
+    places: Ints  # (n_places, ...) ids of those points, vertices and angles of slots
+    limit: float  # bound of the measure
+    sign: int = 1  # 1 if the bound is a smallest, -1 if it is a largest value
 
     @property
     def scale(self) -> float:
@@ -134,22 +125,15 @@ class ConstraintKind:
 
 @dataclass(frozen=True)
 class Margin:
-    """Smallest margin of one kind of requirement.
+    """Smallest margin of one kind of requirement."""
 
-    Attributes:
-        kind: edge_length, block_angle, convexity, void_angle, gap, slot_angle, slot_wall,
-            slot_gap or slot_turn.
-        value: distance to the limit, negative if violated.
-        unit: "mm" or "rad".
-        units: ids of the units at the worst place.
-        where: the same as lattice indices, for messages.
-    """
-
+    # edge_length, block_angle, convexity, void_angle, gap, slot_angle, slot_wall, slot_gap or
+    # slot_turn
     kind: str
-    value: float
-    unit: str
-    units: tuple[int, ...]
-    where: str
+    value: float  # distance to the limit, negative if violated
+    unit: str  # "mm" or "rad"
+    units: tuple[int, ...]  # ids of the units at the worst place
+    where: str  # the same as lattice indices, for messages
 
 
 def kinds(
@@ -157,10 +141,8 @@ def kinds(
 ) -> tuple[ConstraintKind, ...]:
     """Lists the requirements of a lattice at the places that moving certain vertices can change.
 
-    Args:
-        lattice: the network; the units kept apart are those nearer than one lattice spacing.
-        limits: the requirements.
-        moving: ids of those vertices, by default all.
+    Units kept apart are those nearer than one lattice spacing; `moving` are ids of vertices, by
+    default all.
     """
     free = np.ones(lattice.n_vertices + 2 * lattice.n_ligaments, dtype=bool)
     if moving is not None:
@@ -231,11 +213,8 @@ def margins(
 ) -> dict[str, Margin]:
     """Finds the smallest margin of each kind over the whole structure, free or not.
 
-    Args:
-        lattice: the network.
-        vertices: (n_vertices, 2) mm.
-        limits: the requirements.
-        end_angles: (n_ligaments, 2) of slots against their ligaments, rad; by default zero.
+    `vertices` (n_vertices, 2) are in mm; `end_angles` (n_ligaments, 2) are those of slots against
+    their ligaments, rad, by default zero.
     """
     return worst(lattice, kinds(lattice, limits), points(lattice, vertices, end_angles))
 
@@ -245,10 +224,7 @@ def worst(
 ) -> dict[str, Margin]:
     """Finds the smallest margin of each kind among some requirements, and the units concerned.
 
-    Args:
-        lattice: the network.
-        requirements: of `kinds`.
-        at: (n_points, 2) of `points`, mm.
+    `at` (n_points, 2) are places of `points`, mm.
     """
     found: dict[str, Margin] = {}
     present = [kind for kind in requirements if len(kind.places)]

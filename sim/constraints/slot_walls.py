@@ -34,13 +34,8 @@ def slot_depth(room: SlotRoom, along: Numbers, behind: Numbers, ahead: Numbers) 
     """Computes the depth of a slot between two edges of a unit, mm.
 
     It is the least at which both edges are a wall away from the inner end, and what is left of the
-    slot where the tip is cut back holds the shim.
-
-    Args:
-        room: that slots need.
-        along: (2,) vector of the slot, into the unit.
-        behind: (2,) vector of the edge before the vertex, from the vertex.
-        ahead: (2,) vector of the edge after it.
+    slot where the tip is cut back holds the shim. `along` (2,) is the vector of the slot, into the
+    unit; `behind` and `ahead` (2,) are those of the edges before and after the vertex, from it.
     """
     angles = jnp.stack([angle_between(ahead, along), angle_between(along, behind)])
     sine = jnp.maximum(jnp.sin(angles), np.sin(room.angle))
@@ -88,10 +83,8 @@ class SlotGap:
 def points(lattice: Lattice, vertices: Numbers, end_angles: Floats | None = None) -> Floats:
     """Lists vertices and slots' angles (n_vertices + 2 n_ligaments, 2) as places take them, mm.
 
-    Args:
-        lattice: the network.
-        vertices: (n_vertices, 2) mm.
-        end_angles: (n_ligaments, 2) of slots against their ligaments, rad; by default zero.
+    `vertices` (n_vertices, 2) are in mm; `end_angles` (n_ligaments, 2) are those of slots against
+    their ligaments, rad, by default zero.
     """
     turns = np.zeros((2 * lattice.n_ligaments, 2))
     if end_angles is not None:

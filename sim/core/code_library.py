@@ -15,12 +15,9 @@ from numba.core.registry import CPUDispatcher, cpu_target
 
 
 class Loop(CPUDispatcher):
-    """Runs a loop that Python calls; loops that call it take a copy without wrappers for Python.
+    """Runs a loop that Python calls; loops that call it take a copy without wrappers for Python."""
 
-    Attributes:
-        compiler: compiles a function with options of Numba.
-    """
-
+    # compiles a function with options of Numba
     compiler: Callable[[FunctionType, dict[str, Any]], Any]
 
     @property

@@ -27,11 +27,7 @@ class SimulationError(RuntimeError):
 
 
 class NewContactPairs(SimulationError):  # noqa: N818  (a turn that a solve takes, no fault)
-    """Reports units near each other whose coupling the tangent has no room for.
-
-    Args:
-        pairs: (n, 2) units.
-    """
+    """Reports pairs (n, 2) of units near each other whose coupling the tangent has no room for."""
 
     def __init__(self, pairs: Ints) -> None:
         super().__init__(f"units {pairs[0, 0]} and {pairs[0, 1]} meet; solve again with them")

@@ -10,15 +10,11 @@ _INSTALLED = "metacloak."  # begins their names where they are installed as one 
 
 
 def import_closure(modules: Iterable[str], root: Path, *, packages: bool = True) -> dict[str, Path]:
-    """Maps the names of modules and of all that they import, at any depth, to their files.
+    """Maps the dotted names of modules and of all that they import, at any depth, to their files.
 
     Imports inside functions count. A name that is imported from a lazy package leads to the module
-    that its stub names. What lies outside of the project is left out.
-
-    Args:
-        modules: dotted names.
-        root: folder that holds the packages.
-        packages: whether the packages that hold a module are among them.
+    that its stub names. What lies outside of the project's `root` is left out, and without
+    `packages` the packages that hold a module.
     """
     found: dict[str, Path] = {}
     waiting = list(modules)

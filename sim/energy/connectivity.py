@@ -22,25 +22,18 @@ from sim.structure import (
 
 @dataclass(frozen=True)
 class Topology:
-    """Holds what stays fixed while parameters and drives change.
+    """Holds what stays fixed while parameters and drives change."""
 
-    Attributes:
-        ligament_units: (n_ligaments, 2).
-        site: (n_units, 2) where the units are, mm.
-        held: (n_held,) ids (3 unit + dof) of the prescribed dofs, ascending; those of the loads are
-            numbered after all units'.
-        designed: (n_designed,) ligaments whose parameters may be differentiated by.
-        rotation_scale: length that makes rotations comparable with displacements, mm.
-        contact: the law on void angles, or the pairs of units that the law on distances acts on.
-        loaded: (n_loaded,) units under dead loads, forces and a moment, ascending.
-    """
-
-    ligament_units: Ints
-    site: Floats
+    ligament_units: Ints  # (n_ligaments, 2)
+    site: Floats  # (n_units, 2) where the units are, mm
+    # (n_held,) ids (3 unit + dof) of the prescribed dofs, ascending; those of the loads are
+    # numbered after all units'
     held: Ints
-    designed: Ints
-    rotation_scale: float
+    designed: Ints  # (n_designed,) ligaments whose parameters may be differentiated by
+    rotation_scale: float  # length that makes rotations comparable with displacements, mm
+    # the law on void angles, or the pairs of units that the law on distances acts on
     contact: VoidAngleContact | CandidatePairs
+    # (n_loaded,) units under dead loads, forces and a moment, ascending
     loaded: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @cached_property

@@ -22,17 +22,13 @@ from sim.energy.ligament import rotate
 
 
 class DistanceLaw(NamedTuple):
-    """Contact of two units on their distance.
+    """Contact of two units on their distance."""
 
-    Attributes:
-        energy: scale of the barrier, N mm: k (distance / ligament length)^2 with the contact
-            stiffness k of the angle law (N mm/rad^2), since a void that closes by an angle moves
-            its sides by that times the ligament length.
-        distance: activation distance, mm; beyond it there is no contact.
-    """
-
+    # scale of the barrier, N mm: k (distance / ligament length)^2 with the contact stiffness k of
+    # the angle law (N mm/rad^2), since a void that closes by an angle moves its sides by that times
+    # the ligament length
     energy: float | Array
-    distance: float
+    distance: float  # activation distance, mm; beyond it there is no contact
 
 
 class UnitOutline(NamedTuple):
@@ -85,12 +81,8 @@ def pair_energy(
 ) -> Array:
     """Contact energy of two units that do not overlap, N mm.
 
-    Args:
-        motion_a: (3,) displacement (mm) and rotation (rad) of the first unit.
-        motion_b: the same of the second.
-        a: the first unit, its vertices counter-clockwise.
-        b: the second.
-        law: of the contact.
+    Motions (3,) are displacement (mm) and rotation (rad); vertices of the units are counter-
+    clockwise.
     """
     one, other = placed(motion_a, a), placed(motion_b, b)
     between = jnp.vectorize(vertices_energy, signature="(2),(2)->()", excluded={2})

@@ -249,14 +249,8 @@ def _end_slopes(
 ) -> tuple[float, float, float, float]:
     """Gradient of an edge's term by its end, and its rate.
 
-    Args:
-        v: the vertex.
-        p: start of the edge.
-        q: its end.
-        mx: how the vertex moves in the frame of the edge, x.
-        my: y.
-        spin: rate of the edge's rotation.
-        contacts: as of the state.
+    The vertex `v` moves by `mx`, `my` in the frame of the edge from `p` to `q`, which turns at the
+    rate `spin`.
     """
     tx, ty, length, s, x = _frame(v, p, q, contacts)
     nx, ny = ty, -tx

@@ -6,28 +6,17 @@ from sim.core import Floats, Ints
 
 
 class NetworkArrays(NamedTuple):
-    """Arrays of one structure as the kernels take them.
+    """Arrays of one structure as the kernels take them."""
 
-    Attributes:
-        unit: (n_ligaments, 2) units that each ligament joins.
-        arm: (n_ligaments, 2, 2) arm of either end, mm.
-        vector: (n_ligaments, 2) reference ligament vector, mm.
-        void: (n_ligaments, 2) reference void angles, rad.
-        law: (n_ligaments, 3) axial, shear, bending stiffness.
-        natural: (n_ligaments, 3) stretch, mm, shear angle and relative rotation, rad, free of
-            stress.
-        contact: (n_ligaments, 3) contact stiffness, barrier and cutoff angle.
-        touching: (n_touching,) ligaments whose voids may close to the cutoff; empty to skip
-            contact.
-    """
-
-    unit: Ints
-    arm: Floats
-    vector: Floats
-    void: Floats
-    law: Floats
+    unit: Ints  # (n_ligaments, 2) units that each ligament joins
+    arm: Floats  # (n_ligaments, 2, 2) arm of either end, mm
+    vector: Floats  # (n_ligaments, 2) reference ligament vector, mm
+    void: Floats  # (n_ligaments, 2) reference void angles, rad
+    law: Floats  # (n_ligaments, 3) axial, shear, bending stiffness
+    # (n_ligaments, 3) stretch, mm, shear angle and relative rotation, rad, free of stress
     natural: Floats
-    contact: Floats
+    contact: Floats  # (n_ligaments, 3) contact stiffness, barrier and cutoff angle
+    # (n_touching,) ligaments whose voids may close to the cutoff; empty to skip contact
     touching: Ints
 
 
@@ -44,20 +33,14 @@ class Kinematics(NamedTuple):
 
 
 class Sensitivity(NamedTuple):
-    """Derivatives with respect to a network's parameters, shaped as in ``NetworkArrays``.
+    """Derivatives with respect to a network's parameters, shaped as in ``NetworkArrays``."""
 
-    Attributes:
-        arm, vector, void, law, natural: as there.
-        contact: (n_ligaments,) of the contact stiffness alone.
-        corner: (n_vertices, 2) by the arms of all vertices.
-        centroid: (n_units, 2) by the centroids.
-    """
-
+    # arm, vector, void, law, natural: as there
     arm: Floats
     vector: Floats
     void: Floats
     law: Floats
     natural: Floats
-    contact: Floats
-    corner: Floats
-    centroid: Floats
+    contact: Floats  # (n_ligaments,) of the contact stiffness alone
+    corner: Floats  # (n_vertices, 2) by the arms of all vertices
+    centroid: Floats  # (n_units, 2) by the centroids

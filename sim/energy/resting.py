@@ -12,31 +12,22 @@ from sim.structure import Lattice, Parameters
 
 
 class RestState(NamedTuple):
-    """Describes a structure as it rests.
+    """Describes a structure as it rests."""
 
-    Attributes:
-        vertices: (n_vertices, 2) there, mm.
-        vector: (n_ligaments, 2) ligaments there, mm.
-        shear_stiffness: (n_ligaments,) for their length there, N/mm.
-        natural: (n_ligaments, 3) stretch, mm, shear angle and relative rotation, rad, from there,
-            at which ligaments are free of stress.
-    """
-
-    vertices: Array
-    vector: Array
-    shear_stiffness: Array
+    vertices: Array  # (n_vertices, 2) there, mm
+    vector: Array  # (n_ligaments, 2) ligaments there, mm
+    shear_stiffness: Array  # (n_ligaments,) for their length there, N/mm
+    # (n_ligaments, 3) stretch, mm, shear angle and relative rotation, rad, from there, at which
+    # ligaments are free of stress
     natural: Array
 
 
 def rest_state(lattice: Lattice, values: Parameters[Any], motion: Numbers) -> RestState:
     """Moves units as rigid bodies, and tells ligaments' natural states from their new vectors.
 
-    So energies and forces of a motion from there are those of the motion before and from there.
-
-    Args:
-        lattice: how ligaments join the units.
-        values: parameters of the structure as designed.
-        motion: (n_units, 3) from there to rest, mm, mm, rad.
+    So energies and forces of a motion from there are those of the motion before and from there. The
+    values are those of the structure as designed, `motion` (n_units, 3) leads from there to rest,
+    mm, mm, rad.
     """
     values, motion = jax.tree.map(jnp.asarray, values), jnp.asarray(motion)
     turn = motion[lattice.unit, 2]

@@ -13,66 +13,44 @@ from sim.structure import ConcreteParameters
 
 
 class System(NamedTuple):
-    """Holds one structure, its inertia and the numbering of its dofs.
+    """Holds one structure, its inertia and the numbering of its dofs."""
 
-    Attributes:
-        net: ligaments, and contact on their void angles.
-        contacts: contact on the distance of units.
-        mass, damping: (n_dofs,) diagonal.
-        free: (n_dofs,) number of each dof among the free ones, negative where held.
-        dofs: (n_free,) ids of the free dofs in the tangent's order.
-        held: (n_held,) ids of the prescribed dofs, those of the loads last.
-        loaded: (n_loaded,) units under dead loads, whose three components are the last dofs.
-        scale: (n_dofs,) weights that make rotations comparable with displacements, mm.
-        pattern: of the tangent.
-    """
-
-    net: NetworkArrays
-    contacts: ContactArrays
+    net: NetworkArrays  # ligaments, and contact on their void angles
+    contacts: ContactArrays  # contact on the distance of units
+    # mass, damping: (n_dofs,) diagonal
     mass: Floats
     damping: Floats
-    free: Ints
-    dofs: Ints
-    held: Ints
-    loaded: Ints
-    scale: Floats
-    pattern: Pattern
+    free: Ints  # (n_dofs,) number of each dof among the free ones, negative where held
+    dofs: Ints  # (n_free,) ids of the free dofs in the tangent's order
+    held: Ints  # (n_held,) ids of the prescribed dofs, those of the loads last
+    loaded: Ints  # (n_loaded,) units under dead loads, whose three components are the last dofs
+    scale: Floats  # (n_dofs,) weights that make rotations comparable with displacements, mm
+    pattern: Pattern  # of the tangent
 
 
 class Workspace(NamedTuple):
-    """Holds scratch arrays of a solve, overwritten at will.
+    """Holds scratch arrays of a solve, overwritten at will."""
 
-    Attributes:
-        kinematics: of the state that the gradient was last computed at.
-        force, step, product, trial, saved, guess: (n_dofs,).
-        right: (n_free,).
-        matrix: the tangent, then its factor.
-    """
-
-    kinematics: Kinematics
+    kinematics: Kinematics  # of the state that the gradient was last computed at
+    # force, step, product, trial, saved, guess: (n_dofs,)
     force: Floats
     step: Floats
     product: Floats
     trial: Floats
     saved: Floats
     guess: Floats
-    right: Floats
-    matrix: Matrix
+    right: Floats  # (n_free,)
+    matrix: Matrix  # the tangent, then its factor
 
 
 class Bars(NamedTuple):
-    """Holds loss derivatives that a reverse sweep adds to.
+    """Holds loss derivatives that a reverse sweep adds to."""
 
-    Attributes:
-        sensitivity: by the network's parameters.
-        mass, damping: (n_dofs,).
-        drive: by the held values, shaped as the sweep takes them.
-    """
-
-    sensitivity: Sensitivity
+    sensitivity: Sensitivity  # by the network's parameters
+    # mass, damping: (n_dofs,)
     mass: Floats
     damping: Floats
-    drive: Floats
+    drive: Floats  # by the held values, shaped as the sweep takes them
 
 
 @compiled

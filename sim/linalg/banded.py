@@ -52,10 +52,8 @@ def solve(factor: Floats, right: Floats) -> None:
 def number_free_dofs(n_units: int, unit_pairs: Ints, held: Ints) -> tuple[NDArray[np.int64], int]:
     """Numbers the dofs that are not held so that the tangent's band is narrow.
 
-    Args:
-        n_units: number of units, three dofs each.
-        unit_pairs: (n, 2) coupled units.
-        held: ids of the prescribed dofs.
+    Units have three dofs each; `unit_pairs` (n, 2) are coupled; `held` are ids of the prescribed
+    dofs.
 
     Returns:
         (3 n_units,) position of each dof among the free ones, -1 where held; and the half

@@ -17,32 +17,20 @@ SMALLEST_PART = 8
 
 
 class Fronts(NamedTuple):
-    """Fronts in the order of elimination. A front's matrix has its own dofs, then its boundary.
+    """Fronts in the order of elimination. A front's matrix has its own dofs, then its boundary."""
 
-    Attributes:
-        first: (n_fronts + 1,) first own dof, with the end appended.
-        edge: (n_fronts + 1,) where a front's part of ``boundary`` starts.
-        boundary: later dofs that fronts are coupled to, ascending in each front.
-        place: position of each of these in the matrix of the parent, the front that is next to
-            eliminate one of the boundary.
-        child: (n_fronts + 1,) where a front's part of ``children`` starts.
-        children: fronts by parent.
-        panel: (n_fronts + 1,) where a front's own columns start among the factor's values.
-        update: (n_fronts,) where its boundary's block starts in the scratch memory.
-        owner: (n,) front that eliminates each dof.
-        scratch: (1,) size of the scratch memory.
-    """
-
-    first: Ints
-    edge: Ints
-    boundary: Ints
+    first: Ints  # (n_fronts + 1,) first own dof, with the end appended
+    edge: Ints  # (n_fronts + 1,) where a front's part of ``boundary`` starts
+    boundary: Ints  # later dofs that fronts are coupled to, ascending in each front
+    # position of each of these in the matrix of the parent, the front that is next to eliminate one
+    # of the boundary
     place: Ints
-    child: Ints
-    children: Ints
-    panel: Ints
-    update: Ints
-    owner: Ints
-    scratch: Ints
+    child: Ints  # (n_fronts + 1,) where a front's part of ``children`` starts
+    children: Ints  # fronts by parent
+    panel: Ints  # (n_fronts + 1,) where a front's own columns start among the factor's values
+    update: Ints  # (n_fronts,) where its boundary's block starts in the scratch memory
+    owner: Ints  # (n,) front that eliminates each dof
+    scratch: Ints  # (1,) size of the scratch memory
 
 
 def no_fronts() -> Fronts:
@@ -56,10 +44,8 @@ def dissect(
 ) -> tuple[NDArray[np.int64], list[NDArray[np.int64]], list[NDArray[np.int64]]]:
     """Orders the units that have dofs, and groups them in fronts.
 
-    Args:
-        site: (n_units, 2) where the units are.
-        pairs: (n_pairs, 2) coupled units.
-        n_dofs: (n_units,) free dofs of each unit.
+    `site` (n_units, 2) is where they are, `pairs` (n_pairs, 2) are coupled, `n_dofs` (n_units,) are
+    free.
 
     Returns:
         units in order; for each front its own units and its boundary, both as places in the order.
@@ -115,12 +101,10 @@ def _cut(units: Ints, site: Floats, neighbour: Ints) -> list[Ints]:
 
 
 def fronts_of(own: list[Ints], boundaries: list[Ints], n_dofs: Ints) -> Fronts:
-    """Translates fronts from units to dofs.
+    """Translates fronts from units to dofs, of which each unit has `n_dofs` (n_ordered,).
 
-    Args:
-        own: of each front, its units as places in the order of elimination.
-        boundaries: the later units that it is coupled to.
-        n_dofs: (n_ordered,) dofs of each unit in the order of elimination.
+    A front's own units and its boundary, the later ones that it is coupled to, are places in the
+    order of elimination.
     """
     ends = np.concatenate([[0], np.cumsum(n_dofs)])
 

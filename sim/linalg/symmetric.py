@@ -17,15 +17,10 @@ NARROW_FLOP, BAND_FLOP, FRONT_FLOP, FRONT_CALL = 72e-12, 42e-12, 58e-12, 2e-6
 
 
 class Pattern(NamedTuple):
-    """Layout of the entries.
+    """Layout of the entries."""
 
-    Attributes:
-        size: (2,) number of dofs, and half bandwidth; the latter is -1 if stored by fronts.
-        fronts: none if stored as a band.
-    """
-
-    size: Ints
-    fronts: Fronts
+    size: Ints  # (2,) number of dofs, and half bandwidth; the latter is -1 if stored by fronts
+    fronts: Fronts  # none if stored as a band
 
     @property
     def by_fronts(self) -> bool:
@@ -53,17 +48,11 @@ class Pattern(NamedTuple):
 
 
 class Matrix(NamedTuple):
-    """A symmetric matrix, or its Cholesky factor.
+    """A symmetric matrix, or its Cholesky factor."""
 
-    Attributes:
-        values: (n_values,) lower half; of a band column by column.
-        scratch: of the factorisation.
-        pattern: of the entries.
-    """
-
-    values: Floats
-    scratch: Floats
-    pattern: Pattern
+    values: Floats  # (n_values,) lower half; of a band column by column
+    scratch: Floats  # of the factorisation
+    pattern: Pattern  # of the entries
 
 
 def number_free_dofs(
@@ -71,11 +60,9 @@ def number_free_dofs(
 ) -> tuple[Ints, Pattern]:
     """Numbers the dofs that are not held, in the order in which the tangent is solved fastest.
 
-    Args:
-        site: (n_units, 2) where the units are; three dofs each.
-        pairs: (n, 2) coupled units.
-        held: ids of the prescribed dofs.
-        by_fronts: how to store the tangent; by default whichever should be faster.
+    `site` (n_units, 2) is where the units are, three dofs each; `pairs` (n, 2) are coupled; `held`
+    are ids of the prescribed dofs; `by_fronts` tells how to store the tangent, by default whichever
+    should be faster.
 
     Returns:
         (3 n_units,) position of each dof among the free ones, -1 where held; and the pattern.

@@ -42,9 +42,7 @@ class Journal:
     recorded one in any bit means that the code or the machine has changed since: the rest of the
     journal is then of no use, it is cut off with a warning, and the run continues by computing.
 
-    Args:
-        path: the file; its folder must exist.
-        key: identifies the problem; a journal of another key is started anew.
+    The folder of `path` must exist; a journal of another `key` than the problem's is started anew.
 
     Raises:
         JournalInUseError: on entering, if another process holds it.

@@ -14,19 +14,14 @@ MULTIPLIER = 1e-7
 
 @dataclass(frozen=True)
 class Stationarity:
-    """Optimality of a design.
+    """Optimality of a design."""
 
-    Attributes:
-        residual: largest entry of the step (mm) that takes the design, pushed down the gradient by
-            up to 1 mm, back to its linearised constraints; 0 at an optimum, 1 where nothing is in
-            the way of the steepest slope.
-        active: ids of the constraints that carry a multiplier.
-        multipliers: (n_active,) theirs.
-    """
-
+    # largest entry of the step (mm) that takes the design, pushed down the gradient by up to 1 mm,
+    # back to its linearised constraints; 0 at an optimum, 1 where nothing is in the way of the
+    # steepest slope
     residual: float
-    active: Ints
-    multipliers: Floats
+    active: Ints  # ids of the constraints that carry a multiplier
+    multipliers: Floats  # (n_active,) theirs
 
 
 def stationarity(
@@ -40,17 +35,10 @@ def stationarity(
 ) -> Stationarity:
     """Computes the projected gradient |P(x - gradient / scale) - x|, zero exactly at KKT points.
 
-    P is the projection on the linearised constraints and the bounds. At an optimum its multipliers
-    are those of the problem; elsewhere they are estimates.
-
-    Args:
-        gradient: (n,) of the loss.
-        values: (m,) of the constraints.
-        jacobian: (m, n) of the constraints.
-        x: (n,) the design.
-        lower: (n,) bounds.
-        upper: (n,) bounds.
-        scale: slope that counts as steep, such as the largest entry of the first gradient.
+    P is the projection on the linearised constraints (m,) >= 0, with their Jacobian (m, n), and the
+    bounds of the design x (n,). At an optimum its multipliers are those of the problem; elsewhere
+    they are estimates. `scale` is a slope that counts as steep, such as the largest entry of the
+    first gradient.
     """
     slope = gradient / scale
     rows = reachable(values, jacobian, 2 * float(np.abs(slope).max(initial=0.0)))

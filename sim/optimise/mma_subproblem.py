@@ -33,21 +33,17 @@ class UnsolvedError(ArithmeticError):
 
 @dataclass(frozen=True)
 class Separable:
-    """The functions of the subproblem; row 0 is the objective.
+    """The functions of the subproblem; row 0 is the objective."""
 
-    Attributes:
-        centre, distance, low, high: (n,) expansion point, distance to the poles, bounds.
-        up, down: (1 + m, n) coefficients, >= 0.
-        at_centre: (1 + m,) values at the centre.
-    """
-
+    # centre, distance, low, high: (n,) expansion point, distance to the poles, bounds
     centre: Floats
     distance: Floats
     low: Floats
     high: Floats
+    # up, down: (1 + m, n) coefficients, >= 0
     up: sp.csr_array
     down: sp.csr_array
-    at_centre: Floats
+    at_centre: Floats  # (1 + m,) values at the centre
 
     def values(self, x: Floats) -> Floats:
         """All functions (1 + m,)."""
@@ -71,20 +67,16 @@ class Separable:
 
 @dataclass(frozen=True)
 class _State:
-    """Unknowns of the interior point; all but x are positive.
+    """Unknowns of the interior point; all but x are positive."""
 
-    Attributes:
-        x: (n,) variables.
-        y, slack: (m,) elastic variables and slacks of the constraints.
-        price, floor: (m,) multipliers of the constraints and of y >= 0.
-        left, right: (n,) multipliers of the bounds.
-    """
-
-    x: Floats
+    x: Floats  # (n,) variables
+    # y, slack: (m,) elastic variables and slacks of the constraints
     y: Floats
     slack: Floats
+    # price, floor: (m,) multipliers of the constraints and of y >= 0
     price: Floats
     floor: Floats
+    # left, right: (n,) multipliers of the bounds
     left: Floats
     right: Floats
 

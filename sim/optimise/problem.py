@@ -46,54 +46,33 @@ class InfeasibleStartError(ValueError):
 
 @dataclass(frozen=True)
 class Evaluation:
-    """One evaluation of the loss.
+    """One evaluation of the loss."""
 
-    Attributes:
-        number: 0 for the first.
-        x: (n,) the design.
-        loss: NaN if the evaluation failed.
-        aux: further numbers returned with the loss, empty if it failed.
-        violation: largest constraint violation, 0 if feasible.
-        accepted: whether the method moved there.
-        radius: largest change of a variable that the method allowed.
-        kkt_residual: of the last accepted design (see sim.optimise.kkt).
-        failure: why the evaluation failed, or None.
-    """
-
-    number: int
-    x: Floats
-    loss: float
-    aux: Floats
-    violation: float
-    accepted: bool
-    radius: float
-    kkt_residual: float
-    failure: str | None = None
+    number: int  # 0 for the first
+    x: Floats  # (n,) the design
+    loss: float  # NaN if the evaluation failed
+    aux: Floats  # further numbers returned with the loss, empty if it failed
+    violation: float  # largest constraint violation, 0 if feasible
+    accepted: bool  # whether the method moved there
+    radius: float  # largest change of a variable that the method allowed
+    kkt_residual: float  # of the last accepted design (see sim.optimise.kkt)
+    failure: str | None = None  # why the evaluation failed, or None
 
 
 @dataclass(frozen=True)
 class Result:
-    """Best feasible design found, and how it was found.
+    """Best feasible design found, and how it was found."""
 
-    Attributes:
-        x: (n,) the design.
-        loss, gradient, aux: as evaluated there.
-        violation: largest constraint violation, 0 unless no feasible design was met.
-        stationarity: multipliers and residual of the optimality conditions there.
-        best: its number in ``evaluations``.
-        evaluations: all of them, in order.
-        reason: why the method stopped.
-    """
-
-    x: Floats
+    x: Floats  # (n,) the design
+    # loss, gradient, aux: as evaluated there
     loss: float
     gradient: Floats
     aux: Floats
-    violation: float
-    stationarity: Stationarity
-    best: int
-    evaluations: tuple[Evaluation, ...]
-    reason: str
+    violation: float  # largest constraint violation, 0 unless no feasible design was met
+    stationarity: Stationarity  # multipliers and residual of the optimality conditions there
+    best: int  # its number in ``evaluations``
+    evaluations: tuple[Evaluation, ...]  # all of them, in order
+    reason: str  # why the method stopped
 
 
 @dataclass(frozen=True)
@@ -122,29 +101,21 @@ class EvaluatedPoint(ConstraintPoint):
 
 @dataclass
 class CountedProblem:
-    """Counts and records the evaluations of one minimisation and remembers the best design.
+    """Counts and records the evaluations of one minimisation and remembers the best design."""
 
-    Attributes:
-        evaluate: the loss.
-        constrain: the constraints, or None.
-        lower, upper: (n,) bounds, infinite where there are none.
-        budget: largest number of evaluations.
-        target: loss below which a feasible design is good enough.
-        callback: called with each record.
-        confirm: the loss found without help of earlier evaluations, if they help ``evaluate``.
-        steepest: largest entry of the first gradient, the scale of all KKT residuals.
-    """
-
-    evaluate: Evaluate
-    constrain: Constrain | None
+    evaluate: Evaluate  # the loss
+    constrain: Constrain | None  # the constraints, or None
+    # lower, upper: (n,) bounds, infinite where there are none
     lower: Floats
     upper: Floats
-    budget: int
-    target: float = -np.inf
-    callback: Callback | None = None
+    budget: int  # largest number of evaluations
+    target: float = -np.inf  # loss below which a feasible design is good enough
+    callback: Callback | None = None  # called with each record
+    # the loss found without help of earlier evaluations, if they help ``evaluate``
     confirm: Evaluate | None = None
     evaluations: list[Evaluation] = field(default_factory=list)
     best: EvaluatedPoint | None = None
+    # largest entry of the first gradient, the scale of all KKT residuals
     steepest: float | None = None
 
     @property

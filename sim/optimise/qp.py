@@ -11,15 +11,10 @@ from sim.core import Floats
 
 @dataclass(frozen=True)
 class Quadratic:
-    """Solution of a quadratic program.
+    """Solution of a quadratic program."""
 
-    Attributes:
-        step: (n,) the minimiser.
-        multipliers: (m,) of the constraints, >= 0.
-    """
-
-    step: Floats
-    multipliers: Floats
+    step: Floats  # (n,) the minimiser
+    multipliers: Floats  # (m,) of the constraints, >= 0
 
 
 def dense_step(

@@ -65,19 +65,12 @@ class SqpOptions:
 
 @dataclass(frozen=True)
 class SqpTrial:
-    """A feasible step that the model expects to pay.
+    """A feasible step that the model expects to pay."""
 
-    Attributes:
-        place: where it leads.
-        predicted: expected decrease of the loss.
-        rows: ids of the constraints that the quadratic program knew.
-        multipliers: their multipliers.
-    """
-
-    place: ConstraintPoint
-    predicted: float
-    rows: Ints
-    multipliers: Floats
+    place: ConstraintPoint  # where it leads
+    predicted: float  # expected decrease of the loss
+    rows: Ints  # ids of the constraints that the quadratic program knew
+    multipliers: Floats  # their multipliers
 
 
 def sqp(problem: CountedProblem, x0: Floats, options: SqpOptions) -> Result:

@@ -40,20 +40,14 @@ FEW = 20
 
 
 class EquilibriumTrace(NamedTuple):
-    """Holds points of a path, in the order in which it passes them.
+    """Holds points of a path, in the order in which it passes them."""
 
-    Attributes:
-        loads: (n_points,) load parameters.
-        states: (n_points, n_dofs) equilibria, stable or not.
-        eigenvalue: (n_points,) smallest one of the tangent, with rotations times the scale, N/mm;
-            of several negative ones that nearest to zero.
-        falling: (n_points,) number of negative eigenvalues.
-    """
-
-    loads: Floats
-    states: Floats
+    loads: Floats  # (n_points,) load parameters
+    states: Floats  # (n_points, n_dofs) equilibria, stable or not
+    # (n_points,) smallest one of the tangent, with rotations times the scale, N/mm; of several
+    # negative ones that nearest to zero
     eigenvalue: Floats
-    falling: Ints
+    falling: Ints  # (n_points,) number of negative eigenvalues
 
     @property
     def turns(self) -> Ints:
@@ -70,19 +64,11 @@ def trace(
     points: int = 200,
     longest: float = LONGEST,
 ) -> EquilibriumTrace:
-    """Traces the path of equilibria through a stable one.
+    """Traces the path of equilibria through a stable one, from load parameter and state (n_dofs,).
 
     It goes forward from there, and ends where its load passes ``end``, falls below that of rest, or
-    after so many ``points``; earlier where no step leads on, as in jammed contact.
-
-    Args:
-        topology: the structure.
-        values: its parameters.
-        drive: what moves the held dofs.
-        start: load parameter and equilibrium (n_dofs,).
-        end: load parameter.
-        points: at most.
-        longest: arc length of a step at most, mm.
+    after so many ``points``; earlier where no step leads on, as in jammed contact. `longest` is the
+    arc length of a step at most, mm.
     """
     try:
         return _trace(topology, values, drive, start, end, points, longest)
@@ -100,12 +86,6 @@ def trace_first_snap(
 
     It ends where it comes by that snap's load again, or by that of the last one before the next
     load; where it branches, at the full load.
-
-    Args:
-        solver: of the solution.
-        values: parameters of the structure.
-        drive: what moves the held dofs.
-        record: of the solution.
 
     Returns:
         the path; None without a snap, or with one at rest.

@@ -37,9 +37,7 @@ STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 
 def lowest_eigenpair(system: System, state: Floats) -> tuple[float, Floats]:
     """Finds the smallest eigenvalue (N/mm) of the tangent, and its mode (n_dofs,), by Lanczos.
 
-    Args:
-        system: the structure; its scale makes rotations lengths.
-        state: (n_dofs,) a stable equilibrium.
+    `state` (n_dofs,) is a stable equilibrium; the system's scale makes rotations lengths.
 
     Raises:
         SimulationError: the state is not stable.
@@ -66,10 +64,7 @@ def eigenvalue_and_slopes(
 ) -> tuple[float, ConcreteParameters]:
     """Computes the smallest eigenvalue at an equilibrium, and its derivatives by all parameters.
 
-    Args:
-        topology: the structure.
-        values: its parameters.
-        state: (n_dofs,) a stable equilibrium.
+    `state` (n_dofs,) is a stable equilibrium.
 
     Raises:
         SimulationError: the state is not stable.

@@ -69,27 +69,20 @@ SMOOTH, LIMIT_POINT, BRANCHING = 0, 1, 2
 
 
 class Branch(NamedTuple):
-    """Holds the equilibria at all loads.
+    """Holds the equilibria at all loads."""
 
-    Attributes:
-        states: (n_loads, n_dofs).
-        tangents: (n_loads, n_dofs) step to each along the path's tangent at the one before.
-        stable: (n_loads,) whether each is a minimum of the energy.
-        jumped: (n_loads,) whether the path ended on the way there, in a limit point or a branching,
-            and went on after a jump.
-        snapped: (n_loads,) part of the way from the load before at which it last did; NaN if it did
-            not.
-        snaps: (MOST_SNAPS,) where the first of all did, in order: number of the load ahead, and the
-            part of the way to it; NaN behind them.
-        eigenvalue: (n_loads,) smallest one of the tangent, with rotations times the scale, N/mm.
-    """
-
-    states: Floats
-    tangents: Floats
-    stable: Ints
+    states: Floats  # (n_loads, n_dofs)
+    tangents: Floats  # (n_loads, n_dofs) step to each along the path's tangent at the one before
+    stable: Ints  # (n_loads,) whether each is a minimum of the energy
+    # (n_loads,) whether the path ended on the way there, in a limit point or a branching, and went
+    # on after a jump
     jumped: Ints
+    # (n_loads,) part of the way from the load before at which it last did; NaN if it did not
     snapped: Floats
+    # (MOST_SNAPS,) where the first of all did, in order: number of the load ahead, and the part of
+    # the way to it; NaN behind them
     snaps: Floats
+    # (n_loads,) smallest one of the tangent, with rotations times the scale, N/mm
     eigenvalue: Floats
 
 

@@ -20,30 +20,22 @@ stiffness makes of these is no force to balance."""
 
 @dataclass(frozen=True)
 class StaticRecord:
-    """Holds what the reverse sweep of one case needs.
+    """Holds what the reverse sweep of one case needs."""
 
-    Attributes:
-        states: (n_times, n_dofs) equilibria.
-        tangents: (n_times, n_dofs) step to each along the path's tangent at the one before.
-        stable: (n_times,) whether each is a minimum of the energy.
-        jumped: (n_times,) whether the structure jumped on the way there: 1 from a limit point, 2
-            from a branching, else 0.
-        snapped: (n_times,) load parameter at which it last did, NaN if it did not.
-        eigenvalue: (n_times,) smallest one of the tangent at fixed held dofs, with rotations times
-            the topology's scale, N/mm.
-        counts: (4,) gradients, factorisations, shifted factorisations, increments.
-        topology: as solved, with room for all units that met; None if it was the solver's.
-        snaps: (n_snaps,) load parameters at which it jumped, all of them in order.
-    """
-
-    states: Floats
-    tangents: Floats
-    stable: Ints
+    states: Floats  # (n_times, n_dofs) equilibria
+    tangents: Floats  # (n_times, n_dofs) step to each along the path's tangent at the one before
+    stable: Ints  # (n_times,) whether each is a minimum of the energy
+    # (n_times,) whether the structure jumped on the way there: 1 from a limit point, 2 from a
+    # branching, else 0
     jumped: Ints
-    snapped: Floats
+    snapped: Floats  # (n_times,) load parameter at which it last did, NaN if it did not
+    # (n_times,) smallest one of the tangent at fixed held dofs, with rotations times the topology's
+    # scale, N/mm
     eigenvalue: Floats
-    counts: Ints
+    counts: Ints  # (4,) gradients, factorisations, shifted factorisations, increments
+    # as solved, with room for all units that met; None if it was the solver's
     topology: Topology | None = None
+    # (n_snaps,) load parameters at which it jumped, all of them in order
     snaps: Floats = field(default_factory=lambda: np.zeros(0))
 
 
@@ -52,29 +44,21 @@ class StaticSolver:
     """Finds the equilibria of one case at the given load parameters (``Solver``).
 
     The load parameter takes the place of time; the velocities of free dofs are zero.
-
-    Attributes:
-        topology: the structure.
-        output_times: (n_times,) load parameters, in the order in which they are passed.
-        relative: tolerance of the residual, relative to the largest reaction.
-        absolute: its floor, over the greatest axial stiffness, mm: 1e-11 N of the paper's 120 N/mm.
-        threads: cases solved side by side.
-        start: of a similar structure under the same drive, whose steps between the output loads are
-            tried before the path is followed step by step; of the result they change no more than
-            the tolerance allows. Where that structure jumped its step is not tried. A step is the
-            tangent's, bent as it was there.
-        substeps: loads to pass on the way to each output load, that one included.
-        sense: in which the critical mode of a branching is followed: 1 or -1.
     """
 
-    topology: Topology
-    output_times: Floats
-    relative: float = 1e-10
+    topology: Topology  # the structure
+    output_times: Floats  # (n_times,) load parameters, in the order in which they are passed
+    relative: float = 1e-10  # tolerance of the residual, relative to the largest reaction
+    # its floor, over the greatest axial stiffness, mm: 1e-11 N of the paper's 120 N/mm
     absolute: float = 1e-11 / 120.0
-    threads: int = 1
+    threads: int = 1  # cases solved side by side
+    # of a similar structure under the same drive, whose steps between the output loads are tried
+    # before the path is followed step by step; of the result they change no more than the tolerance
+    # allows. Where that structure jumped its step is not tried. A step is the tangent's, bent as it
+    # was there.
     start: StaticRecord | None = None
-    substeps: int = 1
-    sense: float = 1.0
+    substeps: int = 1  # loads to pass on the way to each output load, that one included
+    sense: float = 1.0  # in which the critical mode of a branching is followed: 1 or -1
 
     def refined(self, record: StaticRecord) -> StaticSolver:
         """Passes twice the loads, each to a hundred times tighter a tolerance."""

@@ -20,17 +20,11 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class NetworkImage:
-    """Holds where a quarter turn about the middle takes each part of a network.
+    """Holds where a quarter turn about the middle takes each part of a network."""
 
-    Attributes:
-        unit: (n_units,) the image of each unit.
-        ligament: (n_ligaments,) the image of each ligament.
-        reversed: (n_ligaments,) -1 where the image runs the other way, else 1.
-    """
-
-    unit: Ints
-    ligament: Ints
-    reversed: Ints
+    unit: Ints  # (n_units,) the image of each unit
+    ligament: Ints  # (n_ligaments,) the image of each ligament
+    reversed: Ints  # (n_ligaments,) -1 where the image runs the other way, else 1
 
 
 def equal_cases(scene: Scene, vertices: Floats, values: ConcreteParameters) -> Ints:
@@ -38,12 +32,8 @@ def equal_cases(scene: Scene, vertices: Floats, values: ConcreteParameters) -> I
 
     A case is a turned copy of another if a quarter turn, or several, takes its driven units and the
     direction of their motion to the other's, and leaves all else alone: polygons, ligaments and
-    their stiffness, mass, damping, supports, and the region of the loss.
-
-    Args:
-        scene: the scene.
-        vertices: (n_vertices, 2) of the structure, mm.
-        values: its parameters.
+    their stiffness, mass, damping, supports, and the region of the loss. `vertices` (n_vertices, 2)
+    are the structure's, mm.
     """
     loads = scene.loads
     every = np.arange(len(loads.cases))
@@ -69,9 +59,7 @@ def equal_cases(scene: Scene, vertices: Floats, values: ConcreteParameters) -> I
 def quarter_turn(lattice: Lattice, vertices: Floats) -> NetworkImage | None:
     """Finds the image of a network under a quarter turn about its middle; None if it changes.
 
-    Args:
-        lattice: the network.
-        vertices: (n_vertices, 2) of the structure, mm.
+    `vertices` (n_vertices, 2) are the structure's, mm.
     """
     from scipy.spatial import KDTree
 

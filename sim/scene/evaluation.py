@@ -50,13 +50,9 @@ class GradientChain:
     """Computes a value of simulated motions and its gradient: design, parameters, motion, value.
 
     The same as ``jax.value_and_grad`` through ``differentiable_motion``, but compiled once.
-
-    Args:
-        of_design: map of a design vector to parameters.
-        measure: value and further numbers of displacements (n_cases, n_times, n_units, 3),
-            parameters, and what a call passes besides.
-        designed: whether ``of_design`` is that of a scene: what its adjoint need not compute is
-            then skipped.
+    `measure` gives value and further numbers of displacements (n_cases, n_times, n_units, 3),
+    parameters, and what a call passes besides. `designed` tells whether ``of_design`` is that of a
+    scene: what its adjoint need not compute is then skipped.
     """
 
     def __init__(
@@ -78,14 +74,7 @@ class GradientChain:
         cases: Sequence[PrescribedMotion],
         memory: Memory | None = None,
     ) -> tuple[float, Floats, Floats]:
-        """Value, gradient (n_variables,) and further numbers of a design.
-
-        Args:
-            design: (n_variables,).
-            *passed: to the measure.
-            solver: of the motion.
-            cases: what drives it.
-            memory: of equilibrium paths, for static solvers.
+        """Value, gradient (n_variables,) and further numbers of a design (n_variables,).
 
         Raises:
             SimulationError: a step failed, or an equilibrium is not stable.

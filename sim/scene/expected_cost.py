@@ -25,17 +25,11 @@ HELD_STATES = 4
 
 
 class Cost(NamedTuple):
-    """Holds what a scene is likely to cost.
+    """Holds what a scene is likely to cost."""
 
-    Attributes:
-        unknowns: number of free degrees of freedom.
-        memory: bytes of one load case.
-        seconds: of one core for loss and gradient of a design.
-    """
-
-    unknowns: int
-    memory: float
-    seconds: float
+    unknowns: int  # number of free degrees of freedom
+    memory: float  # bytes of one load case
+    seconds: float  # of one core for loss and gradient of a design
 
 
 def estimate_cost(scene: Scene, times: Floats) -> Cost:

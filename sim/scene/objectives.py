@@ -16,17 +16,11 @@ CHANGE = 2.0
 
 
 class DisplacementMimicking(NamedTuple):
-    """Sums weighted |U|^2 over samples and units, U = (ux/s, uy/s, theta) (Eq. 1, target rest).
+    """Sums weighted |U|^2 over samples and units, U = (ux/s, uy/s, theta) (Eq. 1, target rest)."""
 
-    Attributes:
-        units: (n,) region of interest.
-        spacing: s, mm.
-        weights: (n_times,) quadrature weights.
-    """
-
-    units: Ints
-    spacing: float
-    weights: Floats
+    units: Ints  # (n,) region of interest
+    spacing: float  # s, mm
+    weights: Floats  # (n_times,) quadrature weights
 
     def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Losses (n_cases,) of displacements (n_cases, n_times, n_units, 3)."""
@@ -36,21 +30,13 @@ class DisplacementMimicking(NamedTuple):
 
 
 class RelativeMimicking(NamedTuple):
-    """Takes the root of the weighted sum of |U - U_target|^2, over the size of U_target (Eq. 1).
+    """Takes the root of the weighted sum of |U - U_target|^2, over the size of U_target (Eq. 1)."""
 
-    Attributes:
-        units: (n,) region of interest.
-        spacing: s, mm.
-        weights: (n_times,) quadrature weights.
-        target: (n_cases, n_times, n, 3) displacement to mimic, mm, mm, rad.
-        size: (n_cases,) what counts as 1.
-    """
-
-    units: Ints
-    spacing: float
-    weights: Floats
-    target: Numbers
-    size: Numbers
+    units: Ints  # (n,) region of interest
+    spacing: float  # s, mm
+    weights: Floats  # (n_times,) quadrature weights
+    target: Numbers  # (n_cases, n_times, n, 3) displacement to mimic, mm, mm, rad
+    size: Numbers  # (n_cases,) what counts as 1
 
     def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Losses (n_cases,) of displacements (n_cases, n_times, n_units, 3).
@@ -75,24 +61,15 @@ class ReactionMimicking(NamedTuple):
 
     The force is what the ligaments of the driven units carry to the others: contact on void angles
     turns units and pushes none.
-
-    Attributes:
-        motion: error of the motion.
-        weight: of the force's error in the sum.
-        ligaments: (n,) that join a driven unit to one that is not.
-        ligament_units: (n, 2) units that they join.
-        sign: (n,) 1 where the first of both is driven, else -1.
-        target: (n_cases, n_times, 2) force to mimic, N.
-        size: (n_cases,) what counts as 1, N.
     """
 
-    motion: RelativeMimicking
-    weight: float
-    ligaments: Ints
-    ligament_units: Ints
-    sign: Ints
-    target: Numbers
-    size: Numbers
+    motion: RelativeMimicking  # error of the motion
+    weight: float  # of the force's error in the sum
+    ligaments: Ints  # (n,) that join a driven unit to one that is not
+    ligament_units: Ints  # (n, 2) units that they join
+    sign: Ints  # (n,) 1 where the first of both is driven, else -1
+    target: Numbers  # (n_cases, n_times, 2) force to mimic, N
+    size: Numbers  # (n_cases,) what counts as 1, N
 
     def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Losses (n_cases,) of displacements (n_cases, n_times, n_units, 3)."""
@@ -139,12 +116,8 @@ def estimated_errors(
 
     A motion that starts with a jump converges with the first power of the steps or less: its error
     is about twice what changes. The change of a loss may happen to vanish; what is quadratic in
-    that of the motion is left then.
-
-    Args:
-        motions: of the region, in comparable units, as solved and with half the steps.
-        losses: of both.
-        size: of a loss, whose error is relative to it.
+    that of the motion is left then. Motions, in comparable units, and losses are as solved and with
+    half the steps; `size` is that of a loss, whose error is relative to it.
 
     Returns:
         the error of the motion, root mean square, relative to it; that of the loss.
@@ -163,16 +136,11 @@ class StrainEnergyMimicking(NamedTuple):
     """Sums weighted over samples the region's strain energy, without contact, N mm (Eq. 2).
 
     Strains are counted from the start of the motion: a stress at rest is none of the load's.
-
-    Attributes:
-        ligaments: (n,) ligaments that touch the region.
-        ligament_units: (n, 2) units that they join.
-        weights: (n_times,) quadrature weights.
     """
 
-    ligaments: Ints
-    ligament_units: Ints
-    weights: Floats
+    ligaments: Ints  # (n,) ligaments that touch the region
+    ligament_units: Ints  # (n, 2) units that they join
+    weights: Floats  # (n_times,) quadrature weights
 
     def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Losses (n_cases,) of displacements (n_cases, n_times, n_units, 3)."""

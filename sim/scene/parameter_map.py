@@ -18,11 +18,7 @@ from sim.structure import ConcreteParameters, Parameters, parameters, shape
 
 
 class ParameterMap:
-    """Compiles a differentiable map from design vectors to parameters, and its pull-back.
-
-    Args:
-        of_design: the map, in JAX.
-    """
+    """Compiles a differentiable map (JAX) from designs to parameters, and its pull-back."""
 
     def __init__(self, of_design: Callable[[Array], Parameters[Array]]) -> None:
         self._of_design = jax.jit(of_design)
@@ -53,9 +49,8 @@ def rest_motion(scene: Scene, values: Parameters[Any]) -> Array:
 class RestingMap(ParameterMap):
     """Maps designs whose shims are bent to their parameters as they rest.
 
-    Args:
-        scene: the scene, whose slots turn with the design.
-        of_design: the map to the parameters before the shims turn the units.
+    The slots of the scene turn with the design; ``of_design`` gives the parameters before the shims
+    turn the units.
     """
 
     def __init__(self, scene: Scene, of_design: Callable[[Array], Parameters[Array]]) -> None:

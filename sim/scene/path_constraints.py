@@ -30,11 +30,7 @@ SHARES = np.linspace(1.0, 0.1, 10)
 
 
 def check_unsnapped(record: StaticRecord, load: float) -> None:
-    """Checks that a path goes on without a snap.
-
-    Args:
-        record: of the path.
-        load: parameter of the full load.
+    """Checks that a path goes on without a snap up to the parameter of the full load.
 
     Raises:
         SimulationError: the structure snaps.
@@ -47,20 +43,13 @@ def check_unsnapped(record: StaticRecord, load: float) -> None:
 class PathConstraints:
     """Evaluates what a design must keep to, at rest and under its loads.
 
-    Below the geometric constraints there is, in mm,
-
-    - with ``scene.objective.snap_margin``, one value for each load of each case: lambda / bound - 1
-      of the smallest eigenvalue lambda of the tangent. The bound is that margin times the
-      eigenvalue of the initial structure at rest.
-    - with ``scene.objective.foil``, one value for each case: 1 - strain / limit of the largest
-      strain of all ligaments and times, a p-norm in the place of the maximum.
+    Below the geometric constraints there is, in mm, with ``scene.objective.snap_margin``, one value
+    for each load of each case: lambda / bound - 1 of the smallest eigenvalue lambda of the tangent,
+    the bound being that margin times the eigenvalue of the initial structure at rest; and with
+    ``scene.objective.foil`` one value for each case: 1 - strain / limit of the largest strain of
+    all ligaments and times, a p-norm in the place of the maximum.
 
     A structure that cannot be made is not loaded: its values are infinite.
-
-    Args:
-        scene: the scene, static if it has a snap margin.
-        plan: of `make_plan`.
-        geometry: the other constraints.
 
     Raises:
         ValueError: a scene with a snap margin is not static.
@@ -173,10 +162,8 @@ def _strain_and_slopes(
 def foil_strains(ends: Array, values: Parameters[Array], thickness: float) -> Array:
     """Computes the extreme strains (n_times, n_ligaments, 4) of ligaments of foil.
 
-    Args:
-        ends: (n_times, n_ligaments, 2, 3) motion of the units at both ends, mm, mm, rad.
-        values: parameters of the structure; their natural state is that of straight foil.
-        thickness: of the foil, mm.
+    The foil's thickness is in mm; `ends` (n_times, n_ligaments, 2, 3) are motions of the units at
+    both ends, mm, mm, rad; the natural state of the parameters is that of straight foil.
     """
     of_all = jax.vmap(ligament_strain)
 

@@ -19,25 +19,17 @@ from sim.time_integration import ImplicitSolver
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Holds the decisions for one scene.
+    """Holds the decisions for one scene."""
 
-    Attributes:
-        integrator: how the response is computed.
-        solver: ready to use.
-        case_of: (n_cases,) the simulated case that each load case takes its loss from.
-        decisions: one line for each thing decided.
-        skipped: one line for each thing left out.
-        warnings: one line for each thing that may not be meant; logged when the plan is made.
-        passed: (n_loads,) load parameters, those of the loss among them, by which the paths of a
-            static scene are followed anew to confirm losses; None for four for each of these.
-    """
-
-    integrator: Literal["static", "implicit", "explicit"]
-    solver: Solver
-    case_of: Ints
-    decisions: tuple[str, ...]
-    skipped: tuple[str, ...]
+    integrator: Literal["static", "implicit", "explicit"]  # how the response is computed
+    solver: Solver  # ready to use
+    case_of: Ints  # (n_cases,) the simulated case that each load case takes its loss from
+    decisions: tuple[str, ...]  # one line for each thing decided
+    skipped: tuple[str, ...]  # one line for each thing left out
+    # one line for each thing that may not be meant; logged when the plan is made
     warnings: tuple[str, ...] = ()
+    # (n_loads,) load parameters, those of the loss among them, by which the paths of a static scene
+    # are followed anew to confirm losses; None for four for each of these
     passed: Floats | None = None
 
     @property

@@ -13,31 +13,19 @@ from sim.scene.simulation import simulate
 
 
 class Relaxed(NamedTuple):
-    """Holds a structure at rest under the stress of its own ligaments.
+    """Holds a structure at rest under the stress of its own ligaments."""
 
-    Attributes:
-        scene: the structure as it rests, whose motion is counted from there.
-        vertices: (n_vertices, 2) of its units there, mm.
-        motion: (n_units, 3) from the structure as designed to there, mm, mm, rad.
-    """
-
-    scene: Scene
-    vertices: Floats
-    motion: Floats
+    scene: Scene  # the structure as it rests, whose motion is counted from there
+    vertices: Floats  # (n_vertices, 2) of its units there, mm
+    motion: Floats  # (n_units, 3) from the structure as designed to there, mm, mm, rad
 
 
 class AsBuilt(NamedTuple):
-    """Tells what bent shims make of a structure.
+    """Tells what bent shims make of a structure."""
 
-    Attributes:
-        turn: (n_units,) by which units turn as the shims relax before any load, rad.
-        loss_as_designed: weighted mean over the load cases.
-        loss_as_built: the same, motion and strain counted from where the structure rests.
-    """
-
-    turn: Floats
-    loss_as_designed: float
-    loss_as_built: float
+    turn: Floats  # (n_units,) by which units turn as the shims relax before any load, rad
+    loss_as_designed: float  # weighted mean over the load cases
+    loss_as_built: float  # the same, motion and strain counted from where the structure rests
 
 
 def relaxed(scene: Scene, vertices: Floats | None = None) -> Relaxed:
@@ -45,11 +33,8 @@ def relaxed(scene: Scene, vertices: Floats | None = None) -> Relaxed:
 
     The structure as it rests is the same one: units are moved as rigid bodies, and the natural
     state of each ligament is told from its new vector, so that energies and forces agree.
-
-    Args:
-        scene: the scene; `Material.end_angles` and `Material.elongation` say how ligaments are
-            bent and stretched.
-        vertices: (n_vertices, 2) of the design, mm; by default those of the lattice.
+    `Material.end_angles` and `Material.elongation` say how ligaments are bent and stretched;
+    `vertices` (n_vertices, 2) are the design's, mm, by default those of the lattice.
 
     Raises:
         SimulationError: there is no equilibrium.
@@ -79,13 +64,10 @@ def as_built(
 ) -> AsBuilt:
     """Simulates a structure as designed and as built.
 
-    Args:
-        scene: as designed, with its load cases and its loss.
-        vertices: (n_vertices, 2) of the design, mm.
-        end_angles: (n_ligaments, 2) of the slots against the ligaments, in the order of the
-            structure's ligaments, rad. A shim is straight by itself, and slides in its slots until
-            it is as long as the ligament: it is bent, but not stretched.
-        designed_angles: the same as designed; by default shims are straight.
+    `vertices` (n_vertices, 2) are the design's, mm; `end_angles` (n_ligaments, 2) those of the
+    slots against the ligaments, in the order of the structure's ligaments, rad. A shim is straight
+    by itself, and slides in its slots until it is as long as the ligament: it is bent, but not
+    stretched. As designed, shims are straight by default.
 
     Raises:
         SimulationError: a motion cannot be followed to its end.

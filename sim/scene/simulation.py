@@ -192,11 +192,9 @@ def mimicking(
     the target's greatest size, on load steps the root of the sum of squares over its size at the
     last step (the authors' measure).
 
-    Args:
-        scene: the scene.
-        target: (n_cases, n_times, n_region, 3) what ``target_motion`` returned; it is simulated
-            anew if a scene with a reference comes without.
-        weights: (n_times,) of other samples than the scene's own; without the drive's force.
+    `target` (n_cases, n_times, n_region, 3) is what ``target_motion`` returned, simulated anew if a
+    scene with a reference comes without; `weights` (n_times,) are of other samples than the scene's
+    own, without the drive's force.
 
     Raises:
         ValueError: the scene has no region of interest.

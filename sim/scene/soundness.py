@@ -28,12 +28,7 @@ LARGE = 100_000
 
 
 class SceneError(SimulationError):
-    """Refuses a scene without a meaning.
-
-    Args:
-        reason: what is wrong and what to change.
-        key: of the problem file that it is about.
-    """
+    """Refuses a scene without a meaning; `key` is that of the problem file that it is about."""
 
     def __init__(self, reason: str, key: str) -> None:
         super().__init__(reason)
@@ -45,10 +40,8 @@ def check_scene(
 ) -> tuple[str, ...]:
     """Checks structure, supports, drives and size; returns warnings, logged once a process.
 
-    Args:
-        scene: the scene.
-        vertices: (n_vertices, 2) of the structure, mm; by default the initial one.
-        times: (n_times,) of the output, s; by default the start and the end.
+    `vertices` (n_vertices, 2) are the structure's, mm, by default the initial ones; `times`
+    (n_times,) are those of the output, s, by default the start and the end.
 
     Raises:
         SceneError: something has no meaning.

@@ -55,23 +55,14 @@ SAMPLES = 1001
 
 @dataclass(frozen=True)
 class StepRule:
-    """Holds the first grid of an accuracy, and the errors that it allows.
+    """Holds the first grid of an accuracy, and the errors that it allows."""
 
-    Attributes:
-        first: first step of a graded grid, s.
-        growth: of its steps.
-        per_period: its longest steps, as parts of the drive's period.
-        per_step: error allowed in each step of an adapted grid, over the size of the drive.
-        loss: error allowed in the mean square of the region's motion, relative.
-        motion: in its motion, root mean square, relative.
-    """
-
-    first: float
-    growth: float
-    per_period: int
-    per_step: float
-    loss: float
-    motion: float
+    first: float  # first step of a graded grid, s
+    growth: float  # of its steps
+    per_period: int  # its longest steps, as parts of the drive's period
+    per_step: float  # error allowed in each step of an adapted grid, over the size of the drive
+    loss: float  # error allowed in the mean square of the region's motion, relative
+    motion: float  # in its motion, root mean square, relative
 
 
 RULES: dict[Accuracy, StepRule] = {
@@ -92,15 +83,10 @@ def time_solver(
     decisions: list[str],
     warnings: list[str],
 ) -> TimeSolver:
-    """Chooses the solver of a motion; adds what was decided, a line each.
+    """Chooses the solver of a motion for a structure, with the output at `times` (n_times,), s.
 
-    Args:
-        scene: the scene.
-        values: parameters of the structure that the steps are chosen for.
-        times: (n_times,) of the output, s.
-        threads: cases to solve side by side.
-        decisions: appended to.
-        warnings: likewise, if the accuracy is not reached.
+    What was decided is appended to `decisions`, a line each, and to `warnings` if the accuracy is
+    not reached.
     """
     error = _Error(scene, values)
     explicit = _explicit(scene, values, times, threads)

@@ -26,11 +26,7 @@ _KEPT = ("states", "tangents", "stable", "jumped", "snapped", "eigenvalue")
 
 
 class Paths:
-    """Stores the paths of an optimisation's designs, one record for each simulated case.
-
-    Args:
-        folder: where they are kept; made if there is none.
-    """
+    """Stores the paths of an optimisation's designs in a folder, a record for each case."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

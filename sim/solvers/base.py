@@ -33,15 +33,10 @@ R = TypeVar("R")
 
 
 class CaseMotions(NamedTuple):
-    """Holds the motion of all cases at the solver's output times.
+    """Holds the motion of all cases at the solver's output times."""
 
-    Attributes:
-        displacement: (n_cases, n_times, n_units, 3) mm, mm, rad.
-        velocity: (n_cases, n_times, n_units, 3) mm/s, mm/s, rad/s.
-    """
-
-    displacement: Array
-    velocity: Array
+    displacement: Array  # (n_cases, n_times, n_units, 3) mm, mm, rad
+    velocity: Array  # (n_cases, n_times, n_units, 3) mm/s, mm/s, rad/s
 
 
 class PrescribedMotion(NamedTuple):
@@ -200,14 +195,10 @@ def _check_untraced(values: object) -> None:
 
 
 class Gradients(NamedTuple):
-    """Holds loss derivatives that a reverse sweep returns.
+    """Holds loss derivatives that a reverse sweep returns."""
 
-    Attributes:
-        parameters: summed over the cases.
-        times, drive: of each case, the times and the derivatives by the held values there.
-    """
-
-    parameters: ConcreteParameters
+    parameters: ConcreteParameters  # summed over the cases
+    # times, drive: of each case, the times and the derivatives by the held values there
     times: list[Floats]
     drive: list[Floats]
 
@@ -374,11 +365,8 @@ def _drive_cotangent(
 ) -> PrescribedMotion:
     """Pulls derivatives back to the drive's own numbers.
 
-    Args:
-        held: ids of the held dofs.
-        drive: the case's drive.
-        times: those of the solver's stages and of the output.
-        bars: derivatives by the held values at both, and by their rates at the output.
+    `times` are those of the solver's stages and of the output, `bars` derivatives by the held
+    values at both, and by their rates at the output.
     """
     within, outputs = (jnp.asarray(at) for at in times)
     units, control = np.asarray(drive.units), drive.control

@@ -25,18 +25,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Solved:
-    """Holds a case that was simulated.
+    """Holds a case that was simulated."""
 
-    Attributes:
-        case: the case.
-        displacement, velocity: (n_times, n_units, 3).
-        record: the solver's.
-    """
-
-    case: Case
+    case: Case  # the case
+    # displacement, velocity: (n_times, n_units, 3)
     displacement: Floats
     velocity: Floats
-    record: Any
+    record: Any  # the solver's
 
 
 @dataclass(frozen=True)

@@ -119,15 +119,10 @@ class LinearRamp(NamedTuple):
 
 
 class Together(NamedTuple):
-    """Moves each driven unit by a sum of motions.
+    """Moves each driven unit by a sum of motions."""
 
-    Attributes:
-        motions: (n_motions,) of one course for all units each.
-        shares: (n_units, n_motions) of each motion in that of each unit.
-    """
-
-    motions: tuple[MotionLaw, ...]
-    shares: Floats | Array
+    motions: tuple[MotionLaw, ...]  # (n_motions,) of one course for all units each
+    shares: Floats | Array  # (n_units, n_motions) of each motion in that of each unit
 
     def __call__(self, times: Numbers) -> Numbers:
         """Motion (n_times, n_units, 3) at the given times, s."""
@@ -206,11 +201,9 @@ def held_dofs(clamped: Ints, driven: Ints) -> Ints:
 def held_values(held: Ints, driven: Ints, motion: Numbers, control: Ints | None = None) -> Numbers:
     """Values (n_times, n_held) of the held dofs when ``driven`` follow a motion; the others rest.
 
-    Args:
-        held: (n_held,) ids, those of the loads last: three of each loaded unit, in their order.
-        driven: (n_driven,) units.
-        motion: (n_times, 3) of all of them, or (n_times, n_driven, 3).
-        control: (n_driven, 3) what each component of the motion is; by default a displacement.
+    The loads come last in `held` (n_held,), three of each loaded unit. The motion is (n_times, 3)
+    of all driven units, or (n_times, n_driven, 3); `control` (n_driven, 3) tells what each
+    component is, by default a displacement.
 
     Raises:
         ValueError: a driven dof is not among the held ones.

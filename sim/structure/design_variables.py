@@ -35,18 +35,13 @@ class DesignSpace:
     Without symmetry the variables are the x and y shifts of the free groups, in the order of their
     numbers. With a symmetry each variable moves one orbit of them, by at most its own value. Where
     the slots that hold ligaments turn as well, their angles come after, times ``ANGLE_LENGTH``.
-
-    Attributes:
-        lattice: the initial network; a zero design vector leaves it as it is.
-        groups: (n_free,) free design groups.
-        basis: (2 n_free, n_shifts) orthogonal columns of shifts, one per variable.
-        turns: (2 n_ligaments, n_turns) orthogonal columns of the angles at the first and second
-            end of each ligament, one per variable; none where slots do not turn.
     """
 
-    lattice: Lattice
-    groups: Ints
-    basis: sp.csr_array
+    lattice: Lattice  # the initial network; a zero design vector leaves it as it is
+    groups: Ints  # (n_free,) free design groups
+    basis: sp.csr_array  # (2 n_free, n_shifts) orthogonal columns of shifts, one per variable
+    # (2 n_ligaments, n_turns) orthogonal columns of the angles at the first and second end of each
+    # ligament, one per variable; none where slots do not turn
     turns: sp.csr_array
 
     @property
@@ -101,14 +96,10 @@ def design_space(
     symmetry: Symmetry = "none",
     turning: bool = False,
 ) -> DesignSpace:
-    """Frees every vertex of the cloak's units except those of the ``frozen`` units.
+    """Frees every vertex of the cloak's units except those of the ``frozen`` units, the source.
 
-    Args:
-        lattice: the initial network.
-        cloak: ids of the units to redesign.
-        frozen: ids of units whose vertices must stay (the driven source).
-        symmetry: imposed on the shifts, about the middle of the lattice.
-        turning: whether the slots of all units with a free vertex turn as well.
+    The symmetry is imposed on the shifts, about the middle of the lattice; `turning` tells whether
+    the slots of all units with a free vertex turn as well.
 
     Raises:
         ValueError: the initial lattice or the choice of units does not have the symmetry.
@@ -145,9 +136,7 @@ def _permutation(image: Ints) -> sp.csr_array:
 def _symmetric_basis(count: int, steps: Sequence[sp.sparray]) -> sp.csr_array:
     """Builds an orthogonal basis of the vectors (count,) that do not change by operations.
 
-    Args:
-        count: of the vectors' entries.
-        steps: (count, count) signed permutations, each some power of which is the identity.
+    `steps` (count, count) are signed permutations, each some power of which is the identity.
     """
     identity = sp.csr_array(sp.eye_array(count))
     projector = identity

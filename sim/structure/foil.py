@@ -22,17 +22,11 @@ Value = TypeVar("Value", float, "Floats", "Array")
 
 
 class Foil(NamedTuple):
-    """Holds what strips are cut from.
+    """Holds what strips are cut from."""
 
-    Attributes:
-        young_modulus: MPa.
-        thickness: mm.
-        width: of the strips, across the plane of the structure, mm.
-    """
-
-    young_modulus: float
-    thickness: float
-    width: float
+    young_modulus: float  # MPa
+    thickness: float  # mm
+    width: float  # of the strips, across the plane of the structure, mm
 
     def stiffness(self, length: Value) -> tuple[Value, Value, Value]:
         """Computes axial, shear (N/mm) and bending stiffness (N mm/rad) of free lengths (mm)."""
@@ -42,33 +36,20 @@ class Foil(NamedTuple):
 
 
 class FoilLimit(NamedTuple):
-    """Bounds the strain of the foil that ligaments are made of.
+    """Bounds the strain of the foil that ligaments are made of."""
 
-    Attributes:
-        thickness: mm.
-        strain: largest magnitude.
-    """
-
-    thickness: float
-    strain: float
+    thickness: float  # mm
+    strain: float  # largest magnitude
 
 
 class SlotRoom(NamedTuple):
-    """Holds the size of the slots that hold foil, and the walls that they need; all in mm.
+    """Holds the size of the slots that hold foil, and the walls that they need; all in mm."""
 
-    Attributes:
-        grip: least length in which foil is held.
-        depth: largest one of a slot, from the vertex.
-        width: of a slot.
-        wall: thinnest one around the inner end of a slot and between two slots.
-        tip: units are cut back at a slot's mouth to walls of this thickness.
-    """
-
-    grip: float
-    depth: float
-    width: float
-    wall: float
-    tip: float
+    grip: float  # least length in which foil is held
+    depth: float  # largest one of a slot, from the vertex
+    width: float  # of a slot
+    wall: float  # thinnest one around the inner end of a slot and between two slots
+    tip: float  # units are cut back at a slot's mouth to walls of this thickness
 
     @property
     def cover(self) -> float:
@@ -95,13 +76,8 @@ def face_strains(
         dl / l +- t / 2 (kappa -+ r gamma) / l.
 
     Of a strip between rigid ends r is 6; it is less where measured stiffnesses tell that the ends
-    give way.
-
-    Args:
-        deformation: stretch dl, mm, shear angle gamma and relative turn kappa of the ends, rad.
-        law: shear stiffness k_s, N/mm, and bending stiffness k_b, N mm/rad.
-        length: at rest, mm.
-        thickness: mm.
+    give way. The deformation is stretch dl, mm, gamma and relative turn kappa of the ends, rad; the
+    law k_s, N/mm, and k_b, N mm/rad; l is at rest, mm, and so is the thickness t.
     """
     (stretch, shear, bend), (shearing, bending) = deformation, law
     s_shaped = shearing * length**2 / (2.0 * bending) * shear

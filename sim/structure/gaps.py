@@ -19,30 +19,20 @@ OVERLAP_AREA = 1e-9
 
 @dataclass(frozen=True)
 class Gap:
-    """Smallest distance between two units.
+    """Smallest distance between two units."""
 
-    Attributes:
-        distance: mm, zero if they touch or overlap, infinite if there is only one unit.
-        units: the ids of the two units, ascending; (-1, -1) if there is only one unit.
-    """
-
-    distance: float
+    distance: float  # mm, zero if they touch or overlap, infinite if there is only one unit
+    # the ids of the two units, ascending; (-1, -1) if there is only one unit
     units: tuple[int, int]
 
 
 @dataclass(frozen=True)
 class Clearance:
-    """Gaps and overlaps over a history of states.
+    """Gaps and overlaps over a history of states."""
 
-    Attributes:
-        gap: (n_states,) smallest distance between any two units, mm.
-        gap_units: (n_states, 2) the units concerned.
-        overlaps: (n_states,) number of overlapping pairs.
-    """
-
-    gap: Floats
-    gap_units: Ints
-    overlaps: Ints
+    gap: Floats  # (n_states,) smallest distance between any two units, mm
+    gap_units: Ints  # (n_states, 2) the units concerned
+    overlaps: Ints  # (n_states,) number of overlapping pairs
 
 
 def polygons(lattice: Lattice, vertices: Floats) -> NDArray[np.object_]:

@@ -15,21 +15,13 @@ overlapping edges are slightly negative."""
 
 
 class Shape(NamedTuple):
-    """Reference shape of a network.
+    """Reference shape of a network."""
 
-    Attributes:
-        centroid: (n_units, 2) mm.
-        area: (n_units,) mm^2.
-        polar_moment: (n_units,) about the centroid, mm^4.
-        arm: (n_vertices, 2) centroid to vertex, mm.
-        void_angle: (n_ligaments, 2) opening on the two sides of each ligament, rad.
-    """
-
-    centroid: Array
-    area: Array
-    polar_moment: Array
-    arm: Array
-    void_angle: Array
+    centroid: Array  # (n_units, 2) mm
+    area: Array  # (n_units,) mm^2
+    polar_moment: Array  # (n_units,) about the centroid, mm^4
+    arm: Array  # (n_vertices, 2) centroid to vertex, mm
+    void_angle: Array  # (n_ligaments, 2) opening on the two sides of each ligament, rad
 
 
 def shape(lattice: Lattice, vertices: Numbers) -> Shape:

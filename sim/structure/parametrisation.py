@@ -14,32 +14,20 @@ A = TypeVar("A")
 
 
 class Parameters(NamedTuple, Generic[A]):
-    """All that a response depends on differentiably, besides the drive.
+    """All that a response depends on differentiably, besides the drive."""
 
-    Attributes:
-        arm: (n_ligaments, 2, 2) arms of both ends, mm.
-        vector: (n_ligaments, 2) reference ligament vectors, mm.
-        void: (n_ligaments, 2) reference void angles, rad.
-        law: (n_ligaments, 3) axial, shear, bending stiffness.
-        natural: (n_ligaments, 3) stretch, mm, shear angle and relative rotation, rad, at which the
-            ligaments are free of stress.
-        contact: (n_ligaments,) contact stiffness, N mm/rad^2.
-        corner: (n_vertices, 2) arms of all vertices, mm.
-        centroid: (n_units, 2) mm.
-        mass: (n_units, 3) tonne, tonne, tonne mm^2.
-        damping: (n_units, 3) tonne/s, tonne/s, tonne mm^2/s.
-    """
-
-    arm: A
-    vector: A
-    void: A
-    law: A
+    arm: A  # (n_ligaments, 2, 2) arms of both ends, mm
+    vector: A  # (n_ligaments, 2) reference ligament vectors, mm
+    void: A  # (n_ligaments, 2) reference void angles, rad
+    law: A  # (n_ligaments, 3) axial, shear, bending stiffness
+    # (n_ligaments, 3) stretch, mm, shear angle and relative rotation, rad, at which the ligaments
+    # are free of stress
     natural: A
-    contact: A
-    corner: A
-    centroid: A
-    mass: A
-    damping: A
+    contact: A  # (n_ligaments,) contact stiffness, N mm/rad^2
+    corner: A  # (n_vertices, 2) arms of all vertices, mm
+    centroid: A  # (n_units, 2) mm
+    mass: A  # (n_units, 3) tonne, tonne, tonne mm^2
+    damping: A  # (n_units, 3) tonne/s, tonne/s, tonne mm^2/s
 
 
 ConcreteParameters: TypeAlias = Parameters[Floats]

@@ -24,43 +24,28 @@ LARGEST_FACTOR = 3.0
 
 @dataclass(frozen=True)
 class Perturbation:
-    """Sizes of the deviations of a copy; None draws nothing.
+    """Sizes of the deviations of a copy; None draws nothing."""
 
-    Attributes:
-        geometry: largest shift of a vertex along x and y, evenly spread, mm.
-        ligaments: standard deviation of each ligament's stiffnesses, as a share of them.
-        stiffness: the same of each of the three stiffnesses, of all ligaments together.
-        units: the same of every unit's damping.
-        damping: the same of the damping of all units together.
-        assembly: standard deviations of the units' shifts along x and along y, mm, and of their
-            rotations, rad.
-    """
-
-    geometry: float | None = None
+    geometry: float | None = None  # largest shift of a vertex along x and y, evenly spread, mm
+    # standard deviation of each ligament's stiffnesses, as a share of them
     ligaments: float | None = None
+    # the same of each of the three stiffnesses, of all ligaments together
     stiffness: float | None = None
-    units: float | None = None
-    damping: float | None = None
+    units: float | None = None  # the same of every unit's damping
+    damping: float | None = None  # the same of the damping of all units together
+    # standard deviations of the units' shifts along x and along y, mm, and of their rotations, rad
     assembly: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
 class PerturbedStructure:
-    """A structure with its vertices off their place and its constants off their value.
+    """A structure with its vertices off their place and its constants off their value."""
 
-    Attributes:
-        vertices: (n_vertices, 2) mm.
-        material: its constants, where they differ by ligament or unit as arrays.
-        clashes: units that overlapped, or touched at rest, in the first draw.
-        redrawn: shifts that were drawn again.
-        sound: whether no unit overlaps or touches another at rest.
-    """
-
-    vertices: Floats
-    material: Material
-    clashes: int = 0
-    redrawn: int = 0
-    sound: bool = True
+    vertices: Floats  # (n_vertices, 2) mm
+    material: Material  # its constants, where they differ by ligament or unit as arrays
+    clashes: int = 0  # units that overlapped, or touched at rest, in the first draw
+    redrawn: int = 0  # shifts that were drawn again
+    sound: bool = True  # whether no unit overlaps or touches another at rest
 
 
 def perturbed(
@@ -71,16 +56,10 @@ def perturbed(
     contact: ContactModel,
     seed: Sequence[int],
 ) -> PerturbedStructure:
-    """Draws a copy of a structure.
+    """Draws a copy of a structure; equal seeds give equal copies, whatever else is drawn.
 
-    Args:
-        lattice: of the structure.
-        vertices: (n_vertices, 2) of its design, mm.
-        material: its constants.
-        sizes: of the deviations.
-        contact: law of contact; void angles stay above its cutoff angle: the copy is at rest
-            without a load.
-        seed: equal seeds give equal copies, whatever else is drawn.
+    `vertices` (n_vertices, 2) are the design's, mm. Void angles stay above the cutoff angle of a
+    contact law on them: the copy is at rest without a load.
     """
     random = np.random.default_rng(seed)
     copy = PerturbedStructure(vertices, material)

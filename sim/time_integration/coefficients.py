@@ -8,19 +8,12 @@ from sim.core import Floats
 
 
 class Splitting(NamedTuple):
-    """Holds a symmetric composition that starts and ends with a drift.
+    """Holds a symmetric composition that starts and ends with a drift."""
 
-    Attributes:
-        drifts: (n_kicks + 1,) coefficients.
-        kicks: (n_kicks,) coefficients.
-        order: of accuracy.
-        stability: largest h omega of an undamped oscillator.
-    """
-
-    drifts: Floats
-    kicks: Floats
-    order: int
-    stability: float
+    drifts: Floats  # (n_kicks + 1,) coefficients
+    kicks: Floats  # (n_kicks,) coefficients
+    order: int  # of accuracy
+    stability: float  # largest h omega of an undamped oscillator
 
 
 LEAPFROG = Splitting(np.array([0.5, 0.5]), np.array([1.0]), 2, 2.0)
@@ -51,19 +44,12 @@ BLANES_MOAN = blanes_moan()
 
 
 class Tableau(NamedTuple):
-    """Holds a stiffly accurate method with an explicit first stage and one diagonal coefficient.
+    """Holds a stiffly accurate method with an explicit first stage and one diagonal coefficient."""
 
-    Attributes:
-        stages: (n_stages, n_stages) coefficients; the last row gives the step's end.
-        nodes: (n_stages,) stage times in units of the step.
-        error: (n_stages,) weights of the velocity in the embedded error estimate.
-        order: of the step.
-    """
-
-    stages: Floats
-    nodes: Floats
-    error: Floats
-    order: int
+    stages: Floats  # (n_stages, n_stages) coefficients; the last row gives the step's end
+    nodes: Floats  # (n_stages,) stage times in units of the step
+    error: Floats  # (n_stages,) weights of the velocity in the embedded error estimate
+    order: int  # of the step
 
 
 def esdirk3() -> Tableau:

@@ -25,40 +25,28 @@ MOST = 4096
 
 
 class Pace(NamedTuple):
-    """Holds the splitting of the finer steps.
+    """Holds the splitting of the finer steps."""
 
-    Attributes:
-        drifts, kicks: its coefficients.
-        reach: longest finer step times the angular frequency of the barrier.
-    """
-
+    # drifts, kicks: its coefficients
     drifts: Floats
     kicks: Floats
-    reach: float
+    reach: float  # longest finer step times the angular frequency of the barrier
 
 
 class Flight(NamedTuple):
-    """Scratch of one flight.
+    """Scratch of one flight."""
 
-    Attributes:
-        watched: (n_watched,) ligaments whose voids may come to contact.
-        near: (n_watched,) those that do in this flight.
-        units: (n_units,) the units that these join.
-        met: (n_units,) whether a unit is among them.
-        angle, rate: (n_units,) their rotations and rates at the start.
-        force, pull: (n_units,) moments, and derivatives by held rotations.
-        found: (2,) numbers of voids near and of units.
-    """
-
-    watched: Ints
-    near: Ints
-    units: Ints
-    met: Ints
+    watched: Ints  # (n_watched,) ligaments whose voids may come to contact
+    near: Ints  # (n_watched,) those that do in this flight
+    units: Ints  # (n_units,) the units that these join
+    met: Ints  # (n_units,) whether a unit is among them
+    # angle, rate: (n_units,) their rotations and rates at the start
     angle: Floats
     rate: Floats
+    # force, pull: (n_units,) moments, and derivatives by held rotations
     force: Floats
     pull: Floats
-    found: Ints
+    found: Ints  # (2,) numbers of voids near and of units
 
 
 @compiled

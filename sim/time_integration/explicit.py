@@ -31,17 +31,11 @@ NONE = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class ExplicitRecord:
-    """Holds what the reverse sweep of one case needs.
+    """Holds what the reverse sweep of one case needs."""
 
-    Attributes:
-        steps: as taken.
-        checkpoints: (n_segments, 2, n_dofs) displacement and velocity.
-        topology: as solved, with room for all units that met.
-    """
-
-    steps: Steps
-    checkpoints: Floats
-    topology: Topology
+    steps: Steps  # as taken
+    checkpoints: Floats  # (n_segments, 2, n_dofs) displacement and velocity
+    topology: Topology  # as solved, with room for all units that met
 
 
 @dataclass(frozen=True)
@@ -53,22 +47,14 @@ class ExplicitSolver:
     leaves the admissible states (a blow-up, units that overlap), MAX_REFINEMENTS runs in all.
     Contact on void angles asks for no shorter step: the voids' barriers have finer ones of their
     own.
-
-    Attributes:
-        topology: the structure.
-        duration: s.
-        n_steps: number of steps to take if that is stable.
-        output_times: (n_times,) times of the output, ascending, s.
-        threads: cases solved side by side.
-        splitting: the method.
     """
 
-    topology: Topology
-    duration: float
-    n_steps: int
-    output_times: Floats
-    threads: int = 1
-    splitting: Splitting = BLANES_MOAN
+    topology: Topology  # the structure
+    duration: float  # s
+    n_steps: int  # number of steps to take if that is stable
+    output_times: Floats  # (n_times,) times of the output, ascending, s
+    threads: int = 1  # cases solved side by side
+    splitting: Splitting = BLANES_MOAN  # the method
 
     def refined(self, record: ExplicitRecord) -> ExplicitSolver:
         """See ``Solver``."""

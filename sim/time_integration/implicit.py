@@ -24,23 +24,16 @@ PATIENCE = 20
 
 @dataclass(frozen=True)
 class ImplicitRecord:
-    """Holds what the reverse sweep of one case needs.
+    """Holds what the reverse sweep of one case needs."""
 
-    Attributes:
-        times: (n_steps + 1,) the grid used, with any step that had to be split.
-        u, v, a: (n_steps + 1, n_stages, n_dofs) stage values.
-        touching: ligaments in which contact was computed.
-        counts: (3,) gradients, factorisations, solves.
-        topology: as solved, with room for all units that met.
-    """
-
-    times: Floats
+    times: Floats  # (n_steps + 1,) the grid used, with any step that had to be split
+    # u, v, a: (n_steps + 1, n_stages, n_dofs) stage values
     u: Floats
     v: Floats
     a: Floats
-    touching: Ints
-    counts: Ints
-    topology: Topology
+    touching: Ints  # ligaments in which contact was computed
+    counts: Ints  # (3,) gradients, factorisations, solves
+    topology: Topology  # as solved, with room for all units that met
 
 
 @dataclass(frozen=True)
@@ -49,26 +42,17 @@ class ImplicitSolver:
 
     A step that fails is cut in two, for this solve alone, until it passes, and now and then all
     steps after it; so is one within which the output, interpolated, has units in one another.
-
-    Attributes:
-        topology: the structure.
-        times: (n_steps + 1,) grid, s.
-        output_times: (n_times,) times of the output, s.
-        tolerance: of the stage velocities, mm/s.
-        threads: cases solved side by side.
-        turn_allowance: contact is skipped in ligaments whose units can turn by this much against
-            each other before it acts, rad. If one comes that far after all, the case is solved
-            again with all.
-        tableau: the method.
     """
 
-    topology: Topology
-    times: Floats
-    output_times: Floats
-    tolerance: float = 1e-4
-    threads: int = 1
+    topology: Topology  # the structure
+    times: Floats  # (n_steps + 1,) grid, s
+    output_times: Floats  # (n_times,) times of the output, s
+    tolerance: float = 1e-4  # of the stage velocities, mm/s
+    threads: int = 1  # cases solved side by side
+    # contact is skipped in ligaments whose units can turn by this much against each other before it
+    # acts, rad. If one comes that far after all, the case is solved again with all.
     turn_allowance: float = np.inf
-    tableau: Tableau = ESDIRK3
+    tableau: Tableau = ESDIRK3  # the method
 
     def refined(self, record: ImplicitRecord) -> ImplicitSolver:
         """See ``Solver``."""

@@ -29,55 +29,35 @@ from sim.time_integration.contact_substeps import Flight, Pace, flight_of, fly, 
 
 
 class Steps(NamedTuple):
-    """Equal steps of a splitting.
+    """Equal steps of a splitting."""
 
-    Attributes:
-        n_steps: number of steps.
-        h: step, s.
-        pace: coefficients of the flights, and of the finer steps within them.
-        decay, gain: (n_kicks, n_dofs) of the kicks.
-        drive: (n_steps, n_kicks, n_held) prescribed values at the kicks.
-        segment: steps between checkpoints.
-    """
-
-    n_steps: int
-    h: float
-    pace: Pace
+    n_steps: int  # number of steps
+    h: float  # step, s
+    pace: Pace  # coefficients of the flights, and of the finer steps within them
+    # decay, gain: (n_kicks, n_dofs) of the kicks
     decay: Floats
     gain: Floats
-    drive: Floats
-    segment: int
+    drive: Floats  # (n_steps, n_kicks, n_held) prescribed values at the kicks
+    segment: int  # steps between checkpoints
 
 
 class Outputs(NamedTuple):
-    """Interpolation of the outputs between the ends of a step.
+    """Interpolation of the outputs between the ends of a step."""
 
-    Attributes:
-        interval: (n_times,) step in which each output lies, ascending.
-        values: (n_times, 4) weights of (u, u', v, v') in the displacement.
-        rates: (n_times, 4) the same in the velocity.
-    """
-
-    interval: Ints
-    values: Floats
-    rates: Floats
+    interval: Ints  # (n_times,) step in which each output lies, ascending
+    values: Floats  # (n_times, 4) weights of (u, u', v, v') in the displacement
+    rates: Floats  # (n_times, 4) the same in the velocity
 
 
 class Trace(NamedTuple):
-    """States within some steps, for the reverse sweep: step ``n`` is at ``n % len(u)``.
+    """States within some steps, for the reverse sweep: step ``n`` is at ``n % len(u)``."""
 
-    Attributes:
-        u, v: (n, n_kicks + 1, n_dofs) where the flights start, that is at and after the kicks.
-        before: (n, n_kicks, n_dofs) velocities before the kicks.
-        turn: (n, n_kicks, n_units, 4) of the kinematics at the kicks.
-        shear: (n, n_kicks, n_ligaments) likewise.
-    """
-
+    # u, v: (n, n_kicks + 1, n_dofs) where the flights start, that is at and after the kicks
     u: Floats
     v: Floats
-    before: Floats
-    turn: Floats
-    shear: Floats
+    before: Floats  # (n, n_kicks, n_dofs) velocities before the kicks
+    turn: Floats  # (n, n_kicks, n_units, 4) of the kinematics at the kicks
+    shear: Floats  # (n, n_kicks, n_ligaments) likewise
 
 
 @inlined

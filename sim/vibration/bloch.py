@@ -70,15 +70,10 @@ class UnitCell(NamedTuple):
 
 
 class StrainedCell(NamedTuple):
-    """Holds an equilibrium of a cell.
+    """Holds an equilibrium of a cell."""
 
-    Attributes:
-        motion: (n_units, 3) of the cell's units besides the strain.
-        gradient: (2, 2) displacement gradient from one cell to the next.
-    """
-
-    motion: Floats
-    gradient: Floats
+    motion: Floats  # (n_units, 3) of the cell's units besides the strain
+    gradient: Floats  # (2, 2) displacement gradient from one cell to the next
 
 
 def cell_of(

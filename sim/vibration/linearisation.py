@@ -20,19 +20,14 @@ SHIFT = 1.0
 
 
 class Linear(NamedTuple):
-    """M u'' + C u' + K u = -K_held u_held for small motions u of the free dofs about a state.
+    """M u'' + C u' + K u = -K_held u_held for small motions u of the free dofs about a state."""
 
-    Attributes:
-        stiffness: (n_free, n_free) K, tangent of the energy.
-        coupling: (n_free, n_held) K_held.
-        mass, damping: (n_free,) diagonals of M and C.
-        free, held: ids (3 unit + dof).
-    """
-
-    stiffness: sp.csc_array
-    coupling: sp.csc_array
+    stiffness: sp.csc_array  # (n_free, n_free) K, tangent of the energy
+    coupling: sp.csc_array  # (n_free, n_held) K_held
+    # mass, damping: (n_free,) diagonals of M and C
     mass: Floats
     damping: Floats
+    # free, held: ids (3 unit + dof)
     free: Ints
     held: Ints
 
@@ -43,15 +38,11 @@ class Linear(NamedTuple):
 
 
 class Modes(NamedTuple):
-    """Holds undamped vibrations in ascending order.
+    """Holds undamped vibrations in ascending order."""
 
-    Attributes:
-        square: (count,) squared angular frequency, rad^2/s^2; negative where the state is unstable.
-        shape: (count, n_units, 3) of unit modal mass.
-    """
-
+    # (count,) squared angular frequency, rad^2/s^2; negative where the state is unstable
     square: Floats
-    shape: Floats
+    shape: Floats  # (count, n_units, 3) of unit modal mass
 
     @property
     def frequency(self) -> Floats:
