@@ -45,10 +45,8 @@ class Method:
     own: bool = True  # whether it is one of ours
     tasks: tuple[Task, ...] = ("loss", "gradient")  # what it can do
     repeats: int | None = None  # at most so many timed runs; None for as many as asked for
-    # part of the whole job that a run does; times are divided by it (one of four load cases: 0.25)
-    share: float = 1.0
-    # False for stored numbers, which are compared with the reference and nothing else
-    timed: bool = True
+    share: float = 1.0  # part of the whole job that a run does, by which times are divided
+    timed: bool = True  # False for stored numbers, which are compared and nothing else
     baseline: bool = False  # whether its last stored figures may stand in for a new measurement
     note: str = ""  # what a reader of the table must know
 
@@ -57,7 +55,6 @@ class Method:
 class Measurement:
     """Holds the figures of a method at a setting."""
 
-    # method, setting, task, own, note: as in the method
     method: str
     setting: str = ""
     task: Task = "gradient"
@@ -65,12 +62,9 @@ class Measurement:
     note: str = ""
     units: int = 0  # of the lattice
     compile_s: float = NAN  # wall time to build, compile and warm up, s
-    # processor time of each run over the share of the job that it did, s
-    cpu_s: tuple[float, ...] = ()
-    # the same by the clock, s; longer on a machine that others use too
-    wall_s: tuple[float, ...] = ()
-    # relative error of each value by its name
-    errors: Mapping[str, float] = field(default_factory=dict)
+    cpu_s: tuple[float, ...] = ()  # s, processor time of each run, for the whole job
+    wall_s: tuple[float, ...] = ()  # s, the same by the clock: longer on a shared machine
+    errors: Mapping[str, float] = field(default_factory=dict)  # relative, by name of the value
     work: Mapping[str, int] = field(default_factory=dict)  # counts, of what one run did
     peak_mib: float = NAN  # peak resident memory of the process, MiB
     failure: str = ""  # why it has no figures, or empty
@@ -106,12 +100,10 @@ Measured = Mapping[str, Measurement]
 class Target:
     """Sets a limit to a number that is computed from measurements."""
 
-    # name, unit: as shown
     name: str
     value: Callable[[Measured], float]  # the number; nan where something was not measured
     unit: str = ""
-    # at_most, at_least: what it must keep to; one of the two
-    at_most: float | None = None
+    at_most: float | None = None  # what it must keep to; or:
     at_least: float | None = None
     aim: float | None = None  # what is hoped for
 
@@ -142,12 +134,10 @@ class Suite:
     name: str  # of the suite; its dataset bears it
     subject: str  # what one run computes
     reference: str  # what errors are measured against
-    # gives the measurements, or a dataset without its attributes
     measure: Callable[[MeasuringLimits, Tell], list[Measurement] | xr.Dataset]
     kind: Kind = "benchmark"  # of the dataset
     targets: tuple[Target, ...] = ()  # to be met
-    # whether its methods run in turn on one core, and are compared with stored times
-    in_turn: bool = False
+    in_turn: bool = False  # whether its methods run in turn on one core, for comparison
     short: bool = False  # whether it belongs to the short benchmark
     baselines: tuple[str, ...] = ()  # methods whose stored figures may stand in for new ones
 

@@ -31,11 +31,9 @@ Loss = Callable[[Array], tuple[Array, dict[str, Array]]]
 class RungeKutta:
     """Sets the baseline."""
 
-    # rtol, atol: tolerances of a step, relative and absolute (mm, mm/s, rad, rad/s alike)
-    rtol: float | Array = 1e-8
-    atol: float | Array = 1e-4
-    # bound on the steps; the adjoint keeps about its square root in checkpoints
-    max_steps: int = 2**17
+    rtol: float | Array = 1e-8  # relative tolerance of a step
+    atol: float | Array = 1e-4  # the absolute one (mm, mm/s, rad, rad/s alike)
+    max_steps: int = 2**17  # bound; the adjoint keeps about its square root in checkpoints
     solver: str = "Dopri5"  # name of a method of diffrax
     adjoint: str = "RecursiveCheckpointAdjoint"  # of diffrax, for the gradient
 

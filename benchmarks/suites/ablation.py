@@ -44,8 +44,7 @@ class Skip:
     wave: bool  # whether it stands on the scene in time, or on the static one
     tolerance: float  # relative change of the results that it may make
     why: str  # why it may be left out
-    # at most so many runs; the first one alone if that is what is measured
-    repeats: int | None = None
+    repeats: int | None = None  # at most so many runs; the first alone if that is measured
 
 
 def unloaded_reference(name: str, skipped: float, task: Task) -> Run:

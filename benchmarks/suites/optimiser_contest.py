@@ -35,15 +35,12 @@ class BudgetSpentError(Exception):
 class BudgetedProblem:
     """Counts the evaluations of a problem."""
 
-    # loss, gradient and more of a design
-    evaluate: Callable[[Floats], tuple[float, Floats, Floats]]
+    evaluate: Callable[[Floats], tuple[float, Floats, Floats]]  # loss, gradient and more
     constraints: ConstraintVector  # values >= 0 and Jacobian of a design
     n_variables: int  # of the design
-    # evaluations, seconds: that may be used
     evaluations: int
     seconds: float
-    # designs, losses, clock: of every evaluation; NaN where it failed
-    designs: list[Floats] = field(default_factory=list)
+    designs: list[Floats] = field(default_factory=list)  # of every evaluation
     losses: list[float] = field(default_factory=list)
     clock: list[float] = field(default_factory=list)
     _start: float = field(default_factory=time.process_time)
@@ -83,13 +80,11 @@ class BudgetedProblem:
 class OptimiserHistory(NamedTuple):
     """Holds the history of an optimiser, evaluation by evaluation."""
 
-    # loss, violation, clock: as evaluated: loss, mm, s of processor time since the start
-    loss: Floats
-    violation: Floats
-    clock: Floats
-    # best, residual: loss of the best feasible design so far, and its KKT residual (mm)
-    best: Floats
-    residual: Floats
+    loss: Floats  # as evaluated
+    violation: Floats  # mm
+    clock: Floats  # s of processor time since the start
+    best: Floats  # of the best feasible design so far
+    residual: Floats  # its KKT residual, mm
     final: Floats  # loss of the best feasible design, evaluated afresh
 
 

@@ -31,9 +31,8 @@ _GROSS = (0.3, 0.3, np.deg2rad(3))
 class TruthVideo(NamedTuple):
     """Holds a video with its truth."""
 
-    # name, rate: of the video, Hz
-    name: str
-    rate: float
+    name: str  # of the video
+    rate: float  # Hz
     frames: list[Frame]  # all of them
     specimen: SpecimenOutlines  # what it shows
     scale: float  # px/mm, roughly

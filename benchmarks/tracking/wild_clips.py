@@ -47,8 +47,7 @@ class Errors(NamedTuple):
     good: int  # number of those that are called good
     lost: float  # part of what is wholly in view that is missing
     honesty: Floats  # (3,) root mean square of error over sigma
-    # found, false: faults of timing
-    found: int
+    found: int  # faults of timing
     false: int
 
 

@@ -29,9 +29,8 @@ class Estimate(NamedTuple):
     value: Floats  # (n,) in working units
     error: Floats  # (n,) standard errors of their logarithms
     bound: Floats  # (n,) of Cramer and Rao, of the standard errors
-    # low, high: (n,) ends of the 95 % intervals
-    low: Floats
-    high: Floats
+    low: Floats  # (n,) lower ends of the 95 % intervals
+    high: Floats  # (n,) upper ends
     covariance: Floats  # (n, n) of the logarithms
     status: Ints  # (n,) how well each is determined
     # ratio of the longest to the shortest axis of the wanted constants' ellipsoid, each counted in
@@ -47,9 +46,8 @@ class Estimate(NamedTuple):
 class Quality(NamedTuple):
     """Measures how well the fit explains each set."""
 
-    # points, freedom: (n_sets,) measured values, and what the fit leaves of their freedom
-    points: Ints
-    freedom: Floats
+    points: Ints  # (n_sets,) measured values
+    freedom: Floats  # (n_sets,) what the fit leaves of their freedom
     chi_square: Floats  # (n_sets,) sum of squares in units of the stated, or the estimated, noise
     level: Floats  # (n_sets,) estimated factor on the stated noise; 1 where the noise is known
     autocorrelation: Floats  # (n_sets,) of whitened residuals that follow one another in a course

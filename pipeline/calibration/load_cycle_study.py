@@ -73,10 +73,8 @@ def follow_cycle(asked: LoadCycles, record: CycleRecord, folder: Path) -> CycleP
     path = csv_columns.read_quantities(folder / asked.drive.file, wanted, 3)
     if not (np.diff(path[:, 2]) > 0).all():
         remedy = "give a path along which the clamps come nearer with every line"
-        raise UserError(
-            "the approach does not rise", file=folder / asked.drive.file, key="approach",
-            remedy=remedy,
-        )  # fmt: skip
+        what = "the approach does not rise"
+        raise UserError(what, file=folder / asked.drive.file, key="approach", remedy=remedy)
     begin = Constants(record.material, record.contact, asked.lattice.spacing)
     axial, shear, bending, translation, rotation = begin.numbers
     stiffness = 0.0 if record.contact is None else record.contact.stiffness
@@ -152,12 +150,8 @@ def measure_cycle(record: CycleRecord, folder: Path) -> MeasuredCycle:
     ways = [[each for each in kept if each.loading == rises] for rises in (True, False)]
     if not all(ways):
         remedy = "give a record that goes there and back at least once"
-        raise UserError(
-            "no whole cycle is in the record",
-            file=path,
-            key=record.columns.displacement,
-            remedy=remedy,
-        )
+        what = "no whole cycle is in the record"
+        raise UserError(what, file=path, key=record.columns.displacement, remedy=remedy)
     (closing, scatter), (opening, other) = (load_cycles.mean_branch(each) for each in ways)
     snaps = load_cycles.find_snaps(closing), load_cycles.find_snaps(opening)
     return MeasuredCycle(closing, opening, (scatter, other), snaps, load_cycles.loop_areas(full))

@@ -57,12 +57,9 @@ def moved_parts(asked: RigidParts, folder: Path) -> Iterator[MovedPart]:
         if int(frame) == first:
             continue
         if int(frame) not in pictures or not 0 <= part < len(asked.parts):
-            raise UserError(
-                "a line tells of a picture or a part that is not there",
-                file=table,
-                value=f"{frame:g}, {part:g}",
-                remedy="delete the line, add the picture, or describe the part",
-            )
+            what = "a line tells of a picture or a part that is not there"
+            remedy = "delete the line, add the picture, or describe the part"
+            raise UserError(what, file=table, value=f"{frame:g}, {part:g}", remedy=remedy)
         one = asked.parts[int(part)]
         after = read_picture(pictures[int(frame)])
         patch = Patch(before, after, np.array(one.outline), np.array(one.centre))

@@ -18,12 +18,10 @@ FOLLOWED = ("mean_rotation", "mean_displacement", "contraction", "mimicking_erro
 class Quantity(NamedTuple):
     """Holds a number that units have together."""
 
-    # makes it (..., frames) of motions (..., frames, n, 3) in mm and rad
-    of: Callable[[Floats], Floats]
+    of: Callable[[Floats], Floats]  # of motions (..., frames, n, 3) in mm and rad: (..., frames)
     units: Ints  # (n,) places of the units that count
     less: Floats | None = None  # (frames, n_units, 3) motion that is taken off theirs first
-    # whether they stand for others, so that an interval holds their scatter too
-    sampled: bool = True
+    sampled: bool = True  # whether units stand for others: an interval holds their scatter
 
     def along(self, motion: Floats, units: Ints) -> Floats:
         """Computes the number (..., frames) of motions (..., frames, n, 3) of units (n,)."""

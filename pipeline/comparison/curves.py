@@ -20,12 +20,10 @@ _SEEN = 0.9  # of the frames, or a unit's peak may have been missed
 class Sides(NamedTuple):
     """Holds the sides of a comparison at its frames."""
 
-    # measured, sigma: (frames, units, 3) with their standard uncertainty
-    measured: Floats
-    sigma: Floats
-    # simulated, nominal: likewise
-    simulated: Floats
-    nominal: Floats
+    measured: Floats  # (frames, units, 3)
+    sigma: Floats  # its standard uncertainty
+    simulated: Floats  # (frames, units, 3)
+    nominal: Floats  # likewise
     copies: Floats  # (samples, frames, units, 3) imperfect copies of the simulated one, or none
     level: float  # part of the copies in a band
 

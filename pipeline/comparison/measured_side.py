@@ -27,9 +27,8 @@ class Measurement(NamedTuple):
 
     frames: Ints  # (n_frames,) numbers of those that are compared, in the track
     time: Floats  # (n_frames,) on the track's clock, s
-    # displacement, sigma: (n_frames, n_units, 3) mm and rad, NaN where not measured
-    displacement: Floats
-    sigma: Floats
+    displacement: Floats  # (n_frames, n_units, 3) mm and rad, NaN where not measured
+    sigma: Floats  # (n_frames, n_units, 3) its uncertainty
     use: NDArray[np.int8]  # (n_units,) whether the unit is compared
     centre: Floats  # (n_units, 2) at rest by the design, mm; NaN for those that are absent
     registration: Registration  # of the units at rest
@@ -86,11 +85,9 @@ def check_track(track: xr.Dataset, design: xr.Dataset) -> None:
         raise _another(f"vertices are up to {apart:.2f} mm from where the design has them")
     seen = np.isfinite(track["displacement"].values[:, driven_units(design), 0]).any(axis=1)
     if not seen.any():
-        raise UserError(
-            "no driven unit is seen in any frame: there is nothing to align with",
-            key="window",
-            remedy="film the driven units too, or give a window that shows them",
-        )
+        what = "no driven unit is seen in any frame: there is nothing to align with"
+        remedy = "film the driven units too, or give a window that shows them"
+        raise UserError(what, key="window", remedy=remedy)
     if seen.sum() < LEAST_FRAMES:
         raise too_few_frames(int(seen.sum()))
 

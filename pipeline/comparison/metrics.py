@@ -23,12 +23,10 @@ _STEPS = 6
 class Pair(NamedTuple):
     """Holds both sides of a comparison, NaN in either where there is nothing to compare."""
 
-    # measured, simulated: (frames, units, dofs)
-    measured: Floats
-    simulated: Floats
+    measured: Floats  # (frames, units, dofs)
+    simulated: Floats  # likewise
     sigma: Floats  # standard uncertainty of the measured ones
-    # (frames, units, dofs) rate of the simulated ones, per s; None without a time
-    slope: Floats | None = None
+    slope: Floats | None = None  # (frames, units, dofs) rate of the simulated, per s
     added: bool = False  # whether noise of that uncertainty was added once more
 
     def taken(self, frames: Ints, units: Ints) -> "Pair":

@@ -86,10 +86,8 @@ def filter_held_motion(track: xr.Dataset, scene: Scene) -> HeldMotion:
     there = np.isfinite(measured).all(axis=2) & np.isfinite(sigma).all(axis=2)
     assumed = there.sum(axis=0) < LEAST_SEEN
     if assumed[driven].all():
-        raise UserError(
-            "no driven unit was seen, so the simulation cannot be driven as the specimen was",
-            remedy="film it so that the units at the drive are in the picture",
-        )
+        what = "no driven unit was seen, so the simulation cannot be driven as the specimen was"
+        raise UserError(what, remedy="film it so that the units at the drive are in the picture")
     step = time[-1] / (FINER * (len(time) - 1))
     instants = step * np.arange(FINER * (len(time) - 1) + 1)
     value, slope = (np.zeros((len(instants), len(unit), 3)) for _ in range(2))

@@ -21,9 +21,8 @@ class Registration(NamedTuple):
     rotation: float  # counter-clockwise, rad
     shift: Floats  # (2,) of the specimen's middle, mm
     scale: float  # measured over designed distances
-    # rotation_sigma, shift_sigma, scale_sigma: from the scatter of the units about it
-    rotation_sigma: float
-    shift_sigma: Floats
+    rotation_sigma: float  # from the scatter of the units
+    shift_sigma: Floats  # likewise
     scale_sigma: float
     residual: float  # root mean square distance that it leaves, mm
 

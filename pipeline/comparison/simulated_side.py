@@ -17,8 +17,7 @@ LOG = logging.getLogger(__name__)
 class SimulatedSide(NamedTuple):
     """Holds the response of a structure to the measured motion of its held units."""
 
-    # (frames, units, 3) of all units, mm and rad; NaN for those that are absent
-    displacement: Floats
+    displacement: Floats  # (frames, units, 3) mm and rad; NaN for absent units
     force: Floats  # (frames,) of the drive along its direction, N
     copies: Floats  # (samples, frames, units, 3) of imperfect copies under the same motion
     force_copies: Floats  # (samples, frames) likewise

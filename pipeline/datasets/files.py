@@ -116,12 +116,9 @@ def _opened(path: Path, load: Callable[[Path], Loaded]) -> tuple[seal.State, Loa
 def _check_kept(attributes: dict[Any, Any], sealed: seal.State, path: Path) -> None:
     """Takes the words about a seal off the attributes; refuses a file that has lost it."""
     if attributes.pop(seal.ATTRIBUTE, None) is not None and sealed == "absent":
-        raise UserError(
-            "its seal is missing: it was cut off, or changed by other software",
-            file=path,
-            key=seal.ATTRIBUTE,
-            remedy=f"{_REMEDY}; or remove this attribute, if the change was meant",
-        )
+        what = "its seal is missing: it was cut off, or changed by other software"
+        remedy = f"{_REMEDY}; or remove this attribute, if the change was meant"
+        raise UserError(what, file=path, key=seal.ATTRIBUTE, remedy=remedy)
 
 
 def _loaded(path: Path) -> xr.Dataset:
@@ -135,11 +132,8 @@ def _loaded(path: Path) -> xr.Dataset:
     ) as opened:
         most = min(_MOST * path.stat().st_size, psutil.virtual_memory().available)
         if opened.nbytes > most:
-            raise UserError(
-                f"it would fill {opened.nbytes >> 20} MiB of memory",
-                file=path,
-                remedy="check where it is from; or free some memory",
-            )
+            what = f"it would fill {opened.nbytes >> 20} MiB of memory"
+            raise UserError(what, file=path, remedy="check where it is from; or free some memory")
         return opened.load()
 
 

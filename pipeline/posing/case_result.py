@@ -252,10 +252,8 @@ def _at_rest(scene: Scene, vertices: Floats, angles: Floats) -> PosedStructure:
     try:
         rest = relaxed(scene.bent(angles), vertices)
     except SimulationError as error:
-        raise UserError(
-            f"the cloaked structure does not come to rest with its slots as designed: {error}",
-            remedy="design it again, or without optimiser.as_built",
-        ) from error
+        what = f"the cloaked structure does not come to rest with its slots as designed: {error}"
+        raise UserError(what, remedy="design it again, or without optimiser.as_built") from error
     return PosedStructure(rest.scene, rest.vertices)
 
 

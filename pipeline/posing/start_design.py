@@ -48,10 +48,6 @@ def start_vector(asked: Problem, scene: Scene, path: Path | None, source: Path) 
         there = flat_vertices(scene.lattice, design["vertices"])
         if np.abs(np.asarray(space.vertices(vector)) - there).max() < _SAME:
             return vector
-    raise UserError(
-        "the study's own design has other variables than this one",
-        file=source,
-        key="optimiser.start",
-        value="study",
-        remedy="keep lattice, void, cloak and symmetry, or start from the initial lattice",
-    )
+    what = "the study's own design has other variables than this one"
+    remedy = "keep lattice, void, cloak and symmetry, or start from the initial lattice"
+    raise UserError(what, file=source, key="optimiser.start", value="study", remedy=remedy)

@@ -19,13 +19,9 @@ def sidecar_path(out: Path, source: Path) -> Path:
     """
     path = out.with_suffix(".yaml")
     if path.resolve() == source.resolve():
-        raise UserError(
-            "this file would be written over",
-            file=source,
-            key="--out",
-            value=str(out),
-            remedy="give the result another name or folder",
-        )
+        what = "this file would be written over"
+        remedy = "give the result another name or folder"
+        raise UserError(what, file=source, key="--out", value=str(out), remedy=remedy)
     return path
 
 

@@ -62,12 +62,9 @@ def work(args: argparse.Namespace) -> None:
     """
     asked = problem.load(args.problem, args.preset)
     if asked.designs is not None:
-        raise UserError(
-            "the problem asks for several designs",
-            file=args.problem,
-            key="designs",
-            remedy="name one by its number, as in --preset 1",
-        )
+        what = "the problem asks for several designs"
+        remedy = "name one by its number, as in --preset 1"
+        raise UserError(what, file=args.problem, key="designs", remedy=remedy)
     scene = design_scene(asked, args.problem.parent)
     _check_symmetry(scene, args.problem)
     start = start_vector(asked, scene, args.start, args.problem)
@@ -155,12 +152,9 @@ def optimise(
     """
     budget = asked.optimiser.methods.chosen.get(method)
     if budget is None:
-        raise UserError(
-            f"the problem does not ask for the method {method}",
-            file=source,
-            key="optimiser.methods",
-            remedy=f"add optimiser.methods.{method}.evaluations",
-        )
+        what = f"the problem does not ask for the method {method}"
+        remedy = f"add optimiser.methods.{method}.evaluations"
+        raise UserError(what, file=source, key="optimiser.methods", remedy=remedy)
     key = problem.section_hash(asked, "design", method)
     folder = results / ".journal" / key[:16]
     folder.mkdir(parents=True, exist_ok=True)

@@ -80,11 +80,8 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     asked, virtual = _virtual(path)
     described = sidecar_path(out, path)
     if out.suffix not in virtual.codec.suffixes:
-        raise UserError(
-            f"{virtual.codec.name} does not go into such a file",
-            file=out,
-            remedy=f"name it *{virtual.codec.suffixes[0]}",
-        )
+        what = f"{virtual.codec.name} does not go into such a file"
+        raise UserError(what, file=out, remedy=f"name it *{virtual.codec.suffixes[0]}")
     parents = {"response": response, "design": design}
     origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=True)
     with found_in(path):

@@ -21,12 +21,8 @@ def work(args: argparse.Namespace) -> None:
 def _run(args: argparse.Namespace) -> None:
     asked = problem.load(args.problem, args.preset)
     if asked.robustness is None:
-        raise UserError(
-            "the problem asks for no imperfect copies",
-            file=args.problem,
-            key="robustness",
-            remedy="add robustness.samples",
-        )
+        what = "the problem asks for no imperfect copies"
+        raise UserError(what, file=args.problem, key="robustness", remedy="add robustness.samples")
     design = read_design(asked, args.design)
     scene, vertices = structures_of(scene_of(asked, args.problem.parent), design)["cloaked"]
     samples = np.array_split(np.arange(asked.robustness.samples), args.chunks)[args.chunk]

@@ -28,11 +28,8 @@ def work(args: argparse.Namespace) -> None:
         design = datasets.read(path, "design_method")
         method = methods.get(design.attrs["problem_hash"])
         if method is None:
-            raise UserError(
-                "the design is of another problem",
-                file=path,
-                remedy="remove it and run the same command again",
-            )
+            remedy = "remove it and run the same command again"
+            raise UserError("the design is of another problem", file=path, remedy=remedy)
         designs[method] = design
     best = min(designs, key=lambda method: _merit(designs[method]))
     if overlaps := int(designs[best]["overlaps"]):

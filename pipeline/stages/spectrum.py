@@ -51,12 +51,9 @@ def work(args: argparse.Namespace) -> None:
     """
     asked = problem.load(args.problem, args.preset)
     if asked.spectrum is None:
-        raise UserError(
-            "the problem asks for no linear analysis",
-            file=args.problem,
-            key="spectrum",
-            remedy="give the section spectrum, with transmission: {from: 5 Hz, to: 200 Hz}",
-        )
+        what = "the problem asks for no linear analysis"
+        remedy = "give the section spectrum, with transmission: {from: 5 Hz, to: 200 Hz}"
+        raise UserError(what, file=args.problem, key="spectrum", remedy=remedy)
     try:
         made = spectrum(asked, asked.spectrum, args.problem.parent, args.design)
     except UserError as error:

@@ -30,24 +30,18 @@ def work(args: argparse.Namespace) -> None:
 def _run(args: argparse.Namespace) -> None:
     asked = problem.load(args.problem, args.preset)
     if asked.sweep is None:
-        raise UserError(
-            "the problem asks for no sweep",
-            file=args.problem,
-            key="sweep",
-            remedy="add sweep.grid, sweep.list or sweep.random",
-        )
+        what = "the problem asks for no sweep"
+        remedy = "add sweep.grid, sweep.list or sweep.random"
+        raise UserError(what, file=args.problem, key="sweep", remedy=remedy)
     _compute(args, asked, args.chunk, args.chunks)
 
 
 def _run_constants(args: argparse.Namespace) -> None:
     asked = problem.load(args.problem, args.preset)
     if asked.report.measured_constants is None:
-        raise UserError(
-            "the problem names no measured constants",
-            file=args.problem,
-            key="report.measured_constants",
-            remedy="name their file: report.measured_constants.file",
-        )
+        what = "the problem names no measured constants"
+        remedy = "name their file: report.measured_constants.file"
+        raise UserError(what, file=args.problem, key="report.measured_constants", remedy=remedy)
     _compute(args, problem.over_measured_constants(asked, args.problem.parent), 0, 1)
 
 

@@ -124,13 +124,8 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     design = as_built(datasets.read(source, "design"), asked.structure)
     if asked.load_axis == "driven displacement" and not driven_units(design).any():
         remedy = "write `load_axis: time`, or give the design of a study with driven units"
-        raise UserError(
-            "the design has no driven units",
-            file=path,
-            key="load_axis",
-            value=asked.load_axis,
-            remedy=remedy,
-        )
+        what = "the design has no driven units"
+        raise UserError(what, file=path, key="load_axis", value=asked.load_axis, remedy=remedy)
     parents, force = {"design": source, "video": video}, None
     if (cell := asked.load_cell) is not None:
         held = parents["load_cell"] = path.parent / cell.file
@@ -163,13 +158,9 @@ def _sources(asked: Recording, path: Path, study: Path | None) -> tuple[Path, Pa
         raise UserError("a recording without a video", file=path, key="virtual", remedy=remedy)
     video = path.parent / asked.video
     if asked.sha256 is not None and video.is_file() and datasets.file_hash(video) != asked.sha256:
-        raise UserError(
-            f"damaged: {asked.video} is not the video that was described",
-            file=path,
-            key="sha256",
-            value=asked.sha256,
-            remedy="copy or render it again, or remove this key if the change was meant",
-        )
+        what = f"damaged: {asked.video} is not the video that was described"
+        remedy = "copy or render it again, or remove this key if the change was meant"
+        raise UserError(what, file=path, key="sha256", value=asked.sha256, remedy=remedy)
     return video, _design(asked.design, path, study)
 
 

@@ -38,12 +38,9 @@ def work(args: argparse.Namespace) -> None:
     """Simulates the structures of a design under every variant of the problem."""
     asked = problem.load(args.problem, args.preset)
     if asked.static and asked.horizon.steps is None:
-        raise UserError(
-            "the loss of this problem is not taken on load steps",
-            file=args.problem,
-            key="horizon.steps",
-            remedy="give horizon.steps, or leave the check out",
-        )
+        what = "the loss of this problem is not taken on load steps"
+        remedy = "give horizon.steps, or leave the check out"
+        raise UserError(what, file=args.problem, key="horizon.steps", remedy=remedy)
     design = read_design(asked, args.design)
     made = checks(asked, args.problem.parent, design, args.threads)
     origin = provenance.of_study(asked, "verify", parents={"design": args.design})

@@ -28,9 +28,8 @@ class FilmClock(NamedTuple):
     """Maps times of a video to times of the response."""
 
     frames: int  # number of them
-    # start, end: times of the response, s
-    start: float
-    end: float
+    start: float  # of the response, s
+    end: float  # of the response, s
     still: float  # rest at the video's start, s
     pace: float  # how fast the response's time goes
 

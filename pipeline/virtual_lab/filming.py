@@ -56,11 +56,9 @@ def prepare_film(
     corners = view.camera.project(units.centre)
     if (corners < 0).any() or (corners > np.array(asked.camera.image) - 1).any():
         width, height = np.ptp(units.centre, axis=0) + 2 * units.radius.max()
-        raise UserError(
-            f"the specimen of {width:.0f} mm x {height:.0f} mm does not fit into the picture",
-            key="virtual.camera",
-            remedy="give a larger pixel_size, or a larger image",
-        )
+        what = f"the specimen of {width:.0f} mm x {height:.0f} mm does not fit into the picture"
+        remedy = "give a larger pixel_size, or a larger image"
+        raise UserError(what, key="virtual.camera", remedy=remedy)
     look = asked.look
     scene = FilmScene(
         units,

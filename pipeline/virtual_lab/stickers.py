@@ -71,11 +71,9 @@ def _spots(specimen: SpecimenOutlines, sheet: PdfDocument, labels: list[str]) ->
     try:
         return pack(boxes, (width, height), 0.0, _GAP)
     except TooLargeError as error:
-        raise UserError(
-            "the unit is larger than a page",
-            value=labels[error.part],
-            remedy="print it on larger paper: mark it by hand, or track it bare",
-        ) from error
+        what = "the unit is larger than a page"
+        remedy = "print it on larger paper: mark it by hand, or track it bare"
+        raise UserError(what, value=labels[error.part], remedy=remedy) from error
 
 
 def _sticker(

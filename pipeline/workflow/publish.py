@@ -59,11 +59,8 @@ def work(args: argparse.Namespace) -> None:
     problem_of(study)  # faults of the problem first
     built = ROOT / "results" / str(study)
     if INSTALLED or not (built / "report/index.html").is_file():
-        raise UserError(
-            "there is no built study to publish",
-            file=built,
-            remedy=f"in a checkout, build it first: make {study}",
-        )
+        remedy = f"in a checkout, build it first: make {study}"
+        raise UserError("there is no built study to publish", file=built, remedy=remedy)
     check_commits(built)
     out = built.with_name(f"{study}_crate") if args.out_dir is None else args.out_dir
     if out.exists():

@@ -59,9 +59,7 @@ def work(args: argparse.Namespace) -> None:
         first, second = (_built(args.target, Path(place) / name) for name in ("first", "second"))
         count, apart = differences(first, second)
     if apart:
-        raise UserError(
-            f"{len(apart)} of {count} files differ between two builds: {', '.join(apart)}",
-            key=args.target,
-            remedy="tell the developers, with this list and the versions in requirements.lock",
-        )
+        what = f"{len(apart)} of {count} files differ between two builds: {', '.join(apart)}"
+        remedy = "tell the developers, with this list and the versions in requirements.lock"
+        raise UserError(what, key=args.target, remedy=remedy)
     LOG.info("%s: two builds have the same bytes (files compared: %d)", args.target, count)

@@ -20,8 +20,7 @@ class ReportKind:
     name: str  # in figures.yaml
     facts: Callable[[StudyResults], list[Fact]]  # numbers computed from the datasets
     figure: Callable[[StudyResults], PanelFigure]  # its panels with captions and tables
-    # what the page says of itself, by the caption of the figure and the facts
-    text: Callable[[StudyResults, str, Sequence[Fact]], PageText]
+    text: Callable[[StudyResults, str, Sequence[Fact]], PageText]  # by caption and facts
     animation: Callable[[StudyResults], Animation]  # what the page's player and movies show
 
 

@@ -24,8 +24,7 @@ from reports.page import templating
 class Report:
     """Holds figures, tables and facts, and the page that shows them."""
 
-    # functions that draw in the style of all, by the names of their files
-    figures: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)
+    figures: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)  # by name of file
     # of the page; none makes no page. It gets `values`, `tables`, of every figure its SVG (`svgs`)
     # and the names of its files (`drawn`), and of the first one `svg`, `files`.
     template: str = ""

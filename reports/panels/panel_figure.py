@@ -14,10 +14,8 @@ from reports.study import draft
 class Panel:
     """Describes a part of a figure."""
 
-    # its letter and title, and where they stand: mm from the page's left and top
-    head: tuple[str, str, float, float]
-    # draws the panel below its letter; none if another one draws it too
-    draw: Callable[[Figure], object] | None = None
+    head: tuple[str, str, float, float]  # letter, title, and their place: mm from left and top
+    draw: Callable[[Figure], object] | None = None  # below its letter; none if another one does
     caption: str = ""  # its sentence, as HTML
     tables: Sequence[Table] = ()  # what it shows
 

@@ -32,11 +32,9 @@ def _families(path: Path) -> list[dict[str, Any]]:
         families = json.loads(path.read_text(encoding="utf-8"))["families"]
         return [each | {key: int(each[key]) for key in COLUMNS} for each in families]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise UserError(
-            f"no counts of the stress suite: {error!r}",
-            file=path,
-            remedy="make them with python -m benchmarks.stress",
-        ) from error
+        what = f"no counts of the stress suite: {error!r}"
+        remedy = "make them with python -m benchmarks.stress"
+        raise UserError(what, file=path, remedy=remedy) from error
 
 
 def _share(totals: dict[str, int]) -> str:

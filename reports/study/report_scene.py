@@ -57,12 +57,9 @@ def scene_of_problem(problem: Problem) -> ReportScene:
     """
     drive, lattice = problem.drive, problem.lattice
     if not isinstance(drive, HarmonicDrive | RampHarmonicDrive):
-        raise UserError(
-            "this report is of a harmonic drive",
-            key="drive.kind",
-            value=drive.kind,
-            remedy="give kind: harmonic, or take the datasets without this report",
-        )
+        what = "this report is of a harmonic drive"
+        remedy = "give kind: harmonic, or take the datasets without this report"
+        raise UserError(what, key="drive.kind", value=drive.kind, remedy=remedy)
     _, inner, outer = problem.cloak.bounds or ("centre", 0.0, 0.0)
     return ReportScene(
         title=problem.title,

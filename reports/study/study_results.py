@@ -138,11 +138,8 @@ def load(
     chosen = whole if preset is None else problem.load(path, preset)
     wanted = problem.outputs(chosen)
     if missing := [kind for kind in wanted if kind not in files]:
-        raise UserError(
-            f"the report of this problem also shows its {missing[0]} dataset",
-            file=path,
-            remedy=f"give it as --{missing[0]}",
-        )
+        what = f"the report of this problem also shows its {missing[0]} dataset"
+        raise UserError(what, file=path, remedy=f"give it as --{missing[0]}")
     read = {name: datasets.read(files[name], cast(Kind, REPORTED[name].kind)) for name in wanted}
     for name, data in read.items():
         posed = chosen
@@ -193,13 +190,9 @@ def check_problem(posed: Problem, stage: str, data: xr.Dataset, path: Path) -> N
     """
     wanted = problem.section_hash(posed, stage)
     if (found := data.attrs.get("problem_hash")) != wanted:
-        raise UserError(
-            "the dataset was made from another problem (or another preset)",
-            file=path,
-            key="problem_hash",
-            value=found,
-            remedy="run its stage again with this problem, or give the problem it was made from",
-        )
+        what = "the dataset was made from another problem (or another preset)"
+        remedy = "run its stage again with this problem, or give the problem it was made from"
+        raise UserError(what, file=path, key="problem_hash", value=found, remedy=remedy)
 
 
 def display_name(problem: Problem, structure: str) -> str:

@@ -17,8 +17,7 @@ from numba.core.registry import CPUDispatcher, cpu_target
 class Loop(CPUDispatcher):
     """Runs a loop that Python calls; loops that call it take a copy without wrappers for Python."""
 
-    # compiles a function with options of Numba
-    compiler: Callable[[FunctionType, dict[str, Any]], Any]
+    compiler: Callable[[FunctionType, dict[str, Any]], Any]  # with options of Numba
 
     @property
     def _numba_type_(self) -> Any:  # noqa: ANN401

@@ -31,10 +31,8 @@ class Topology:
     held: Ints
     designed: Ints  # (n_designed,) ligaments whose parameters may be differentiated by
     rotation_scale: float  # length that makes rotations comparable with displacements, mm
-    # the law on void angles, or the pairs of units that the law on distances acts on
-    contact: VoidAngleContact | CandidatePairs
-    # (n_loaded,) units under dead loads, forces and a moment, ascending
-    loaded: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    contact: VoidAngleContact | CandidatePairs  # law, or what the law on distances acts on
+    loaded: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # (n_loaded,) units
 
     @cached_property
     def numbering(self) -> tuple[Ints, Pattern]:

@@ -13,11 +13,9 @@ class NetworkArrays(NamedTuple):
     vector: Floats  # (n_ligaments, 2) reference ligament vector, mm
     void: Floats  # (n_ligaments, 2) reference void angles, rad
     law: Floats  # (n_ligaments, 3) axial, shear, bending stiffness
-    # (n_ligaments, 3) stretch, mm, shear angle and relative rotation, rad, free of stress
-    natural: Floats
+    natural: Floats  # (n_ligaments, 3) stretch, mm, shear, bend, rad, free of stress
     contact: Floats  # (n_ligaments, 3) contact stiffness, barrier and cutoff angle
-    # (n_touching,) ligaments whose voids may close to the cutoff; empty to skip contact
-    touching: Ints
+    touching: Ints  # (n_touching,) ligaments whose voids may close; empty: no contact
 
 
 class Kinematics(NamedTuple):

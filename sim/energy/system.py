@@ -17,9 +17,8 @@ class System(NamedTuple):
 
     net: NetworkArrays  # ligaments, and contact on their void angles
     contacts: ContactArrays  # contact on the distance of units
-    # mass, damping: (n_dofs,) diagonal
-    mass: Floats
-    damping: Floats
+    mass: Floats  # (n_dofs,) diagonal
+    damping: Floats  # (n_dofs,) diagonal
     free: Ints  # (n_dofs,) number of each dof among the free ones, negative where held
     dofs: Ints  # (n_free,) ids of the free dofs in the tangent's order
     held: Ints  # (n_held,) ids of the prescribed dofs, those of the loads last
@@ -32,8 +31,7 @@ class Workspace(NamedTuple):
     """Holds scratch arrays of a solve, overwritten at will."""
 
     kinematics: Kinematics  # of the state that the gradient was last computed at
-    # force, step, product, trial, saved, guess: (n_dofs,)
-    force: Floats
+    force: Floats  # (n_dofs,), as the next five
     step: Floats
     product: Floats
     trial: Floats
@@ -47,9 +45,8 @@ class Bars(NamedTuple):
     """Holds loss derivatives that a reverse sweep adds to."""
 
     sensitivity: Sensitivity  # by the network's parameters
-    # mass, damping: (n_dofs,)
-    mass: Floats
-    damping: Floats
+    mass: Floats  # (n_dofs,)
+    damping: Floats  # (n_dofs,)
     drive: Floats  # by the held values, shaped as the sweep takes them
 
 

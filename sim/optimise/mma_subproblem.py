@@ -35,14 +35,12 @@ class UnsolvedError(ArithmeticError):
 class Separable:
     """The functions of the subproblem; row 0 is the objective."""
 
-    # centre, distance, low, high: (n,) expansion point, distance to the poles, bounds
-    centre: Floats
-    distance: Floats
-    low: Floats
-    high: Floats
-    # up, down: (1 + m, n) coefficients, >= 0
-    up: sp.csr_array
-    down: sp.csr_array
+    centre: Floats  # (n,) expansion point
+    distance: Floats  # (n,) to the poles
+    low: Floats  # (n,) lower bounds
+    high: Floats  # (n,) upper bounds
+    up: sp.csr_array  # (1 + m, n) coefficients, >= 0
+    down: sp.csr_array  # likewise
     at_centre: Floats  # (1 + m,) values at the centre
 
     def values(self, x: Floats) -> Floats:
@@ -70,15 +68,12 @@ class _State:
     """Unknowns of the interior point; all but x are positive."""
 
     x: Floats  # (n,) variables
-    # y, slack: (m,) elastic variables and slacks of the constraints
-    y: Floats
-    slack: Floats
-    # price, floor: (m,) multipliers of the constraints and of y >= 0
-    price: Floats
-    floor: Floats
-    # left, right: (n,) multipliers of the bounds
-    left: Floats
-    right: Floats
+    y: Floats  # (m,) elastic variables of the constraints
+    slack: Floats  # (m,) their slacks
+    price: Floats  # (m,) multipliers of the constraints
+    floor: Floats  # (m,) multipliers of y >= 0
+    left: Floats  # (n,) multipliers of the lower bounds
+    right: Floats  # (n,) of the upper bounds
 
     def moved(self, step: _State, length: float) -> _State:
         return _State(

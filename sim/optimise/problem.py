@@ -64,8 +64,7 @@ class Result:
     """Best feasible design found, and how it was found."""
 
     x: Floats  # (n,) the design
-    # loss, gradient, aux: as evaluated there
-    loss: float
+    loss: float  # as evaluated there
     gradient: Floats
     aux: Floats
     violation: float  # largest constraint violation, 0 unless no feasible design was met
@@ -105,18 +104,15 @@ class CountedProblem:
 
     evaluate: Evaluate  # the loss
     constrain: Constrain | None  # the constraints, or None
-    # lower, upper: (n,) bounds, infinite where there are none
-    lower: Floats
-    upper: Floats
+    lower: Floats  # (n,) lower bounds, or infinite
+    upper: Floats  # (n,) upper bounds, or infinite
     budget: int  # largest number of evaluations
     target: float = -np.inf  # loss below which a feasible design is good enough
     callback: Callback | None = None  # called with each record
-    # the loss found without help of earlier evaluations, if they help ``evaluate``
-    confirm: Evaluate | None = None
+    confirm: Evaluate | None = None  # loss without help of earlier evaluations
     evaluations: list[Evaluation] = field(default_factory=list)
     best: EvaluatedPoint | None = None
-    # largest entry of the first gradient, the scale of all KKT residuals
-    steepest: float | None = None
+    steepest: float | None = None  # entry of the first gradient, scale of residuals
 
     @property
     def finished(self) -> str | None:

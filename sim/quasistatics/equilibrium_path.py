@@ -77,13 +77,11 @@ class Branch(NamedTuple):
     # (n_loads,) whether the path ended on the way there, in a limit point or a branching, and went
     # on after a jump
     jumped: Ints
-    # (n_loads,) part of the way from the load before at which it last did; NaN if it did not
-    snapped: Floats
+    snapped: Floats  # (n_loads,) part of the way from the load before at the last jump, or NaN
     # (MOST_SNAPS,) where the first of all did, in order: number of the load ahead, and the part of
     # the way to it; NaN behind them
     snaps: Floats
-    # (n_loads,) smallest one of the tangent, with rotations times the scale, N/mm
-    eigenvalue: Floats
+    eigenvalue: Floats  # (n_loads,) smallest of the tangent, rotations times scale, N/mm
 
 
 @inlined

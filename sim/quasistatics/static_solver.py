@@ -33,10 +33,8 @@ class StaticRecord:
     # scale, N/mm
     eigenvalue: Floats
     counts: Ints  # (4,) gradients, factorisations, shifted factorisations, increments
-    # as solved, with room for all units that met; None if it was the solver's
-    topology: Topology | None = None
-    # (n_snaps,) load parameters at which it jumped, all of them in order
-    snaps: Floats = field(default_factory=lambda: np.zeros(0))
+    topology: Topology | None = None  # with room for all units that met; None: the solver's
+    snaps: Floats = field(default_factory=lambda: np.zeros(0))  # (n_snaps,) load parameters
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,7 @@ class StaticSolver:
     topology: Topology  # the structure
     output_times: Floats  # (n_times,) load parameters, in the order in which they are passed
     relative: float = 1e-10  # tolerance of the residual, relative to the largest reaction
-    # its floor, over the greatest axial stiffness, mm: 1e-11 N of the paper's 120 N/mm
-    absolute: float = 1e-11 / 120.0
+    absolute: float = 1e-11 / 120.0  # its floor by the greatest axial stiffness, mm
     threads: int = 1  # cases solved side by side
     # of a similar structure under the same drive, whose steps between the output loads are tried
     # before the path is followed step by step; of the result they change no more than the tolerance

@@ -26,8 +26,7 @@ class Plan:
     case_of: Ints  # (n_cases,) the simulated case that each load case takes its loss from
     decisions: tuple[str, ...]  # one line for each thing decided
     skipped: tuple[str, ...]  # one line for each thing left out
-    # one line for each thing that may not be meant; logged when the plan is made
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # what may not be meant, a line each; logged
     # (n_loads,) load parameters, those of the loss among them, by which the paths of a static scene
     # are followed anew to confirm losses; None for four for each of these
     passed: Floats | None = None

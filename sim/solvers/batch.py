@@ -28,9 +28,8 @@ class Solved:
     """Holds a case that was simulated."""
 
     case: Case  # the case
-    # displacement, velocity: (n_times, n_units, 3)
-    displacement: Floats
-    velocity: Floats
+    displacement: Floats  # (n_times, n_units, 3)
+    velocity: Floats  # (n_times, n_units, 3)
     record: Any  # the solver's
 
 

@@ -22,8 +22,7 @@ class Gap:
     """Smallest distance between two units."""
 
     distance: float  # mm, zero if they touch or overlap, infinite if there is only one unit
-    # the ids of the two units, ascending; (-1, -1) if there is only one unit
-    units: tuple[int, int]
+    units: tuple[int, int]  # ids, ascending; (-1, -1) if there is only one unit
 
 
 @dataclass(frozen=True)

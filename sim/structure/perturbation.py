@@ -27,10 +27,8 @@ class Perturbation:
     """Sizes of the deviations of a copy; None draws nothing."""
 
     geometry: float | None = None  # largest shift of a vertex along x and y, evenly spread, mm
-    # standard deviation of each ligament's stiffnesses, as a share of them
-    ligaments: float | None = None
-    # the same of each of the three stiffnesses, of all ligaments together
-    stiffness: float | None = None
+    ligaments: float | None = None  # deviation of each ligament's stiffnesses, as a share
+    stiffness: float | None = None  # of each of the three stiffnesses, of all ligaments
     units: float | None = None  # the same of every unit's damping
     damping: float | None = None  # the same of the damping of all units together
     # standard deviations of the units' shifts along x and along y, mm, and of their rotations, rad

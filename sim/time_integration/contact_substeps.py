@@ -27,9 +27,8 @@ MOST = 4096
 class Pace(NamedTuple):
     """Holds the splitting of the finer steps."""
 
-    # drifts, kicks: its coefficients
-    drifts: Floats
-    kicks: Floats
+    drifts: Floats  # its coefficients
+    kicks: Floats  # its coefficients
     reach: float  # longest finer step times the angular frequency of the barrier
 
 
@@ -40,12 +39,10 @@ class Flight(NamedTuple):
     near: Ints  # (n_watched,) those that do in this flight
     units: Ints  # (n_units,) the units that these join
     met: Ints  # (n_units,) whether a unit is among them
-    # angle, rate: (n_units,) their rotations and rates at the start
-    angle: Floats
-    rate: Floats
-    # force, pull: (n_units,) moments, and derivatives by held rotations
-    force: Floats
-    pull: Floats
+    angle: Floats  # (n_units,) rotations at the start
+    rate: Floats  # (n_units,) their rates
+    force: Floats  # (n_units,) moments
+    pull: Floats  # (n_units,) derivatives by held rotations
     found: Ints  # (2,) numbers of voids near and of units
 
 

@@ -34,9 +34,8 @@ class Steps(NamedTuple):
     n_steps: int  # number of steps
     h: float  # step, s
     pace: Pace  # coefficients of the flights, and of the finer steps within them
-    # decay, gain: (n_kicks, n_dofs) of the kicks
-    decay: Floats
-    gain: Floats
+    decay: Floats  # (n_kicks, n_dofs) of the kicks
+    gain: Floats  # (n_kicks, n_dofs) of the kicks
     drive: Floats  # (n_steps, n_kicks, n_held) prescribed values at the kicks
     segment: int  # steps between checkpoints
 

@@ -24,12 +24,10 @@ class Linear(NamedTuple):
 
     stiffness: sp.csc_array  # (n_free, n_free) K, tangent of the energy
     coupling: sp.csc_array  # (n_free, n_held) K_held
-    # mass, damping: (n_free,) diagonals of M and C
-    mass: Floats
-    damping: Floats
-    # free, held: ids (3 unit + dof)
-    free: Ints
-    held: Ints
+    mass: Floats  # (n_free,) diagonal of M
+    damping: Floats  # (n_free,) diagonal of C
+    free: Ints  # ids (3 unit + dof)
+    held: Ints  # ids (3 unit + dof)
 
     @property
     def n_dofs(self) -> int:
@@ -40,8 +38,7 @@ class Linear(NamedTuple):
 class Modes(NamedTuple):
     """Holds undamped vibrations in ascending order."""
 
-    # (count,) squared angular frequency, rad^2/s^2; negative where the state is unstable
-    square: Floats
+    square: Floats  # (count,) squared angular frequency, rad^2/s^2; negative: unstable
     shape: Floats  # (count, n_units, 3) of unit modal mass
 
     @property

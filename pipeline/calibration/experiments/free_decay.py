@@ -24,9 +24,8 @@ SAMPLES = 32
 class DecayPeaks(NamedTuple):
     """Holds the decay by a line through the logarithms of peaks."""
 
-    # ratio, error: damping ratio and its standard error
-    ratio: float
-    error: float
+    ratio: float  # damping ratio
+    error: float  # its standard error
     frequency: float  # of the damped oscillation, rad/s
 
 

@@ -48,16 +48,12 @@ COARSE = (
 class FullFieldExperiment:
     """Holds a track as an experiment (``experiment.Experiment``)."""
 
-    # displacements of the free units, one course after the other; then the load
-    measured: MeasuredValues
+    measured: MeasuredValues  # displacements of the free units, course by course; then the load
     simulation: SpecimenSimulation  # of the specimen under the measured motion of the held units
     sees: tuple[ConstantName, ...]  # the constants that the motion depends on
-    # of that motion by one standard deviation of its noise, in independent ways
-    changes: tuple[DriveChange, ...]
-    # the motion with those changes that the free units speak for, if it is known
-    drive: PrescribedMotion | None = None
-    # (n,) of the motion that these changes make
-    part: Floats = field(default_factory=lambda: np.zeros(()))
+    changes: tuple[DriveChange, ...]  # by one standard deviation of that motion's noise each
+    drive: PrescribedMotion | None = None  # with the changes that free units speak for
+    part: Floats = field(default_factory=lambda: np.zeros(()))  # (n,) what these changes make
 
     @property
     def own_start(self) -> Floats:

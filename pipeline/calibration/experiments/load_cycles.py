@@ -24,9 +24,8 @@ class LoadBranch(NamedTuple):
     """Holds one way of a cycle."""
 
     loading: bool  # whether the displacement rises
-    # displacement, force: (n,) in the order of time, mm and N
-    displacement: Floats
-    force: Floats
+    displacement: Floats  # (n,) in the order of time, mm
+    force: Floats  # (n,) N
 
     @property
     def work(self) -> float:

@@ -37,12 +37,10 @@ _PART = 0.5
 class DriveChange(NamedTuple):
     """Changes one course of a drive by one standard deviation of its noise."""
 
-    # place, dof: which course
     place: int
     dof: int
-    # value, slope: (n,) at the knots
-    value: Floats
-    slope: Floats
+    value: Floats  # (n,) at the knots
+    slope: Floats  # (n,) there
 
 
 def apply_changes(
@@ -69,9 +67,8 @@ class _HeldCourses:
     """Holds courses of the held units. At the first frame they rest: it tells the constants."""
 
     time: Floats  # (n,) s
-    # measured, sigma: (n, n_held, 3) mm, mm, rad
-    measured: Floats
-    sigma: Floats
+    measured: Floats  # (n, n_held, 3) mm, mm, rad
+    sigma: Floats  # (n, n_held, 3) their uncertainty
     there: np.ndarray  # (n, n_held) whether the unit was seen
     bias: Floats  # (3,) standard deviation of what stays with a unit through all frames
     reach: Floats  # (3,) range of the motions, mm, mm, rad

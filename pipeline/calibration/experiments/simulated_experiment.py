@@ -42,8 +42,7 @@ class SpecimenSimulation:
     solver: AnySolver  # of its motion
     drive: PrescribedMotion  # of its held units
     seen: Seen  # what is measured of the motion
-    # (n_ligaments,) or (1,) factor on the stiffness of each ligament
-    stiffer: Floats = field(default_factory=lambda: np.ones(1))
+    stiffer: Floats = field(default_factory=lambda: np.ones(1))  # (n_ligaments,) or (1,) factor
 
     @cached_property
     def parameters(self) -> Callable[[Numbers], Parameters[Array]]:

@@ -34,8 +34,7 @@ class CurveEmulator(NamedTuple):
     displacement: Floats  # (STEPS,) mm
     centre: Floats  # (2,) of the logarithms of the ratios
     coefficients: Floats  # (orders + 1, orders + 1, STEPS) of g
-    # largest relative error of the force at random constants that it was not made from
-    error: float
+    error: float  # largest relative one of the force at other random constants
 
     def weights(self, displacement: Floats) -> Floats:
         """Returns the coefficients (n, orders + 1, orders + 1) at displacements in mm."""

@@ -48,8 +48,7 @@ class Readings(NamedTuple):
 
     used: Numbers  # (n_kinds, n) one for what the fit is to see, zero for the rest
     log_force: Numbers  # (n_kinds, n) of forces in N
-    # (n_kinds, n, n_samples) of each sample in the mean that was read; a one for a sample's own
-    shares: Numbers
+    shares: Numbers  # (n_kinds, n, n_samples) of each sample in the mean that was read
     place: Numbers  # (n_kinds, n) displacement over the largest one
     base: Numbers  # (n_kinds, n) logarithm of the displacement in mm
     weights: Numbers  # (n_kinds, n, ...) of the emulator

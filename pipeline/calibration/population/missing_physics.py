@@ -33,14 +33,12 @@ class TestPath(NamedTuple):
     displacement: Floats  # (n,) of the grips from zero on, mm
     force: Floats  # (n,) N
     motion: Floats  # (n, n_units, 3) mm, mm, rad
-    # stretch, shear, bend: (n, n_ligaments) mm, rad, rad
-    stretch: Floats
-    shear: Floats
-    bend: Floats
+    stretch: Floats  # (n, n_ligaments) mm
+    shear: Floats  # (n, n_ligaments) rad
+    bend: Floats  # (n, n_ligaments) rad
     law: Floats  # (n_ligaments, 3) stiffness
-    # mass, damping: (n_units, 3)
-    mass: Floats
-    damping: Floats
+    mass: Floats  # (n_units, 3)
+    damping: Floats  # (n_units, 3)
 
     def slope(self, values: Floats) -> Floats:
         """Differentiates values (n, ...) by the displacement."""
@@ -141,14 +139,11 @@ MECHANISMS = (
 class RankedMechanism(NamedTuple):
     """Holds of a mechanism what it changes the prediction by, of either sign where it has none."""
 
-    # name, size: in words
     name: str
     size: str
-    # (n,) of the logarithm of the predicted force, after the constants took up theirs
-    change: Floats
+    change: Floats  # (n,) of the predicted force's logarithm, constants refitted
     explained: float  # part of the residual's root mean square that it takes away, at that size
-    # the same if it acted in the predicted test alone, and the constants took up nothing
-    alone: float
+    alone: float  # the same, if it acted in the predicted test alone
     wanted: float  # factor on the size that takes away most
 
 

@@ -20,9 +20,8 @@ class SampleCurve(NamedTuple):
     name: str  # of the set
     test: TestKind  # its kind
     samples: tuple[str, ...]  # that it is the mean of
-    # displacement, force: (n,) mm, N
-    displacement: Floats
-    force: Floats
+    displacement: Floats  # (n,) mm
+    force: Floats  # (n,) N
 
     def thinned(self, end: float, points: int) -> Self:
         """Averages what was read about each of so many even displacements up to `end`, mm.

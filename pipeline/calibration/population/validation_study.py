@@ -60,8 +60,7 @@ class FittedPopulation(NamedTuple):
 
     asked: Population  # for what
     curves: Sequence[SampleCurve]  # as read
-    # of every kind of test; `predicted` is that of the other specimen
-    emulators: Mapping[TestKind, CurveEmulator]
+    emulators: Mapping[TestKind, CurveEmulator]  # by kind of test; `predicted`: other specimen
     predicted: CurveEmulator
     readings: Readings  # as fitted, and the curve that each is of
     names: Sequence[Sequence[str]]

@@ -26,8 +26,7 @@ class CsvCells(NamedTuple):
     """Holds the cells of a CSV."""
 
     rows: list[list[str]]  # of cells, without blanks about them
-    # a comma, semicolon or tab; with the latter two, a comma may be the decimal sign
-    separator: str
+    separator: str  # comma, semicolon or tab; with these two, a comma may be decimal
 
     def number(self, row: list[str], column: int) -> float | None:
         """Reads the number in a cell; None where it holds no finite one."""

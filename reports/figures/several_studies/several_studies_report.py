@@ -109,12 +109,9 @@ def load(figure: Path, asked: JointFigure, preset: str | None, results: Path) ->
         found.append(study_results.load_built(path, preset, results))
     for each in found:
         if not each.problem.static:
-            raise UserError(
-                f"{each.name} is not driven by a ramp",
-                file=figure,
-                key="studies",
-                remedy="show studies along a load side by side",
-            )
+            what = f"{each.name} is not driven by a ramp"
+            remedy = "show studies along a load side by side"
+            raise UserError(what, file=figure, key="studies", remedy=remedy)
     return found
 
 

@@ -23,7 +23,6 @@ class BenchmarkSection(NamedTuple):
     """Holds a picture of the page."""
 
     name: str  # of its files
-    # title, caption: what it shows
     title: str
     caption: str
     draw: Callable[[], Figure]  # makes it

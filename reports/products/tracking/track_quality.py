@@ -50,9 +50,8 @@ class TrackQuality(NamedTuple):
     floor: Floats  # (3,) scatter over these, likewise; NaN if there are too few
     lost: Floats  # (frames, reasons) part of the units that are missing, by reason
     reasons: tuple[str, ...]  # their names
-    # duplicates, dropped: numbers of the frames
-    duplicates: list[int]
-    dropped: list[int]
+    duplicates: list[int]  # numbers of the frames
+    dropped: list[int]  # likewise
     fastest: float  # largest step of a unit from frame to frame, px
     irregular: float  # spread of the frames' intervals, relative to their median
     residual: float  # root mean square of the first frame's residuals, px
