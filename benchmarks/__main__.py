@@ -35,11 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _work(failed: list[str], args: argparse.Namespace) -> None:
-    """Measures every suite; those without a reference or a figure are appended to ``failed``.
-
-    Raises:
-        UserError: there is no such suite, core or folder of videos.
-    """
+    """Measures every suite; those without a reference or a figure are appended to ``failed``."""
     chosen = suites(args.names, args.videos)
     alone = args.core is not None or any(suite.in_turn for suite in chosen)
     core = pin(args.core) if alone else None

@@ -55,11 +55,7 @@ def run_stage(name: str, words: Sequence[str]) -> int:
 
 
 def _work(stage: Stage, given: Namespace | list[str]) -> None:
-    """Imports the module of a stage, and does its work.
-
-    Raises:
-        UserError: a package is missing, which an extra installs; or a fault of the stage.
-    """
+    """Imports the module of a stage, and does its work."""
     try:
         cli.imported(PREFIX + stage.module).work(given)
     except ModuleNotFoundError as error:

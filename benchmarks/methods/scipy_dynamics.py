@@ -100,11 +100,7 @@ def _prepare(name: str, method: str, tolerance: float, task: Task) -> Run:
 def _solve(
     posed: LoadCase, values: ConcreteParameters, method: str, tolerance: float
 ) -> tuple[Floats, dict[str, int]]:
-    """Computes the motion (1, n_times, n_units, 3), and counts.
-
-    Raises:
-        ArithmeticError: scipy gave up.
-    """
+    """Computes the motion (1, n_times, n_units, 3), and counts."""
     motion = FirstOrderSystem(posed, values)
     start, span = np.zeros(2 * len(motion.free)), (0.0, posed.scene.loads.duration)
     more: dict[str, Any] = {"rtol": tolerance, "atol": tolerance, "t_eval": posed.times}

@@ -81,11 +81,7 @@ def _prepare(name: str, method: Callable[..., Floats], tolerance: float, task: T
 
 
 def _path(posed: LoadCase, solve: partial[Floats]) -> Floats:
-    """Follows the states (1, n_times, n_units, 3) along the loads; cuts increments that fail.
-
-    Raises:
-        ArithmeticError: not even small increments succeed.
-    """
+    """Follows the states (1, n_times, n_units, 3) along the loads; cuts increments that fail."""
     (drive,), top = posed.scene.loads.cases, posed.scene.topology
     held = drive.values(top.held, np.concatenate([[0.0], posed.times]))
     states = [np.zeros(top.n_dofs)]
@@ -115,11 +111,7 @@ def _between(
 
 
 def _newton(balance: EquilibriumProblem, tolerance: float, state: Floats, moved: Floats) -> Floats:
-    """Takes full Newton steps, the first along the path's tangent.
-
-    Raises:
-        ArithmeticError: no convergence.
-    """
+    """Takes full Newton steps, the first along the path's tangent."""
     made, factor = balance.tangent(state)
     force_, _ = balance.residual(state)
     new = state + moved

@@ -70,11 +70,7 @@ def _motion(posed: Scene, case: int, time: Floats) -> Floats:
 def _force(
     made: TrackedSpecimen, posed: Scene, asked: TrackedMotion, motion: Floats, folder: Path
 ) -> Floats:
-    """Computes the force (n_times,) of the drive along its direction, N.
-
-    Raises:
-        UserError: it has no direction.
-    """
+    """Computes the force (n_times,) of the drive along its direction, N."""
     towards = made.towards(asked.case)
     if towards is None:
         what = "a drive by a time series does not tell the direction of a load cell"

@@ -93,11 +93,7 @@ def read_attributes(path: str | Path) -> Mapping[str, Any]:
 
 
 def _opened(path: Path, load: Callable[[Path], Loaded]) -> tuple[seal.State, Loaded]:
-    """Checks the seal of a file and loads from it.
-
-    Raises:
-        UserError: missing, truncated, foreign or damaged.
-    """
+    """Checks the seal of a file and loads from it."""
     remedy = _REMEDY
     try:
         sealed = seal.check_seal(path)
@@ -122,11 +118,7 @@ def _check_kept(attributes: dict[Any, Any], sealed: seal.State, path: Path) -> N
 
 
 def _loaded(path: Path) -> xr.Dataset:
-    """Loads a file into memory.
-
-    Raises:
-        UserError: it claims to hold more than it can, or than there is room for.
-    """
+    """Loads a file into memory."""
     with xr.open_dataset(
         path, engine="netcdf4", decode_times=False, decode_timedelta=False
     ) as opened:

@@ -83,15 +83,11 @@ def sync(path: Path) -> None:
 
 def _clear(path: Path) -> None:
     """Removes what a process that was killed left of the file."""
-    for left in path.parent.glob(f".part_*_{_literal(path.name)}"):
+    name = path.name.replace("[", "[[]")  # a pattern that matches the name alone
+    for left in path.parent.glob(f".part_*_{name}"):
         number = left.name.split("_")[1]
         if not (number.isdecimal() and psutil.pid_exists(int(number))):
             _discard(left)
-
-
-def _literal(name: str) -> str:
-    """Makes a pattern that matches the name alone."""
-    return name.replace("[", "[[]")
 
 
 def _discard(path: Path) -> None:

@@ -74,11 +74,7 @@ def bent_warning(name: str, angles: Floats) -> list[str]:
 
 
 def _built(name: str, structure: PosedStructure, angles: Floats) -> PosedStructure:
-    """Bends the shims of a structure, and lets it come to rest; one of straight shims is as it is.
-
-    Raises:
-        SimulationError: there is no equilibrium.
-    """
+    """Bends the shims of a structure, and lets it come to rest; straight ones leave it as it is."""
     scene, vertices = structure
     if np.abs(angles).max(initial=0.0) < STRAIGHT:
         return structure

@@ -1,6 +1,6 @@
 """Tells how to cite this software, in words and as BibTeX, from CITATION.cff."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -62,11 +62,7 @@ def _bibtex(work: Mapping[str, Any]) -> str:
         "title": f"{{{work['title']}}}",
         **{name: str(work[name]) for name in ("journal", "year", "version", "doi") if name in work},
     }
-    if notes := _noted(work.get("identifiers", ())):
-        fields["note"] = notes
+    if others := work.get("identifiers"):
+        fields["note"] = ", ".join(each["value"] for each in others)
     lines = [f"  {name} = {{{value}}}," for name, value in fields.items()]
     return "\n".join([f"@{'article' if article else 'misc'}{{{key},", *lines, "}"])
-
-
-def _noted(identifiers: Sequence[Mapping[str, str]]) -> str:
-    return ", ".join(each["value"] for each in identifiers)

@@ -60,13 +60,9 @@ def _at(
 ) -> tuple[tuple[float, float], tuple[float, float]]:  # fmt: skip
     """Place and velocity of a vertex in the other unit's frame at a multiple of the step.
 
-    Args:
-        multiple: of the step.
-        w: from the other unit's centroid to its own, at the step's start.
-        d: the change of that over the step.
-        r: from its own centroid to the vertex.
-        spin: rotation of the other unit over the step.
-        relative: rotation of its own relative to that.
+    `w` leads from the other unit's centroid to its own at the step's start and changes by `d`, `r`
+    from its own to the vertex; `spin` is the rotation of the other unit, `relative` its own
+    relative to that.
     """
     cb, sb = math.cos(multiple * spin), math.sin(multiple * spin)
     cr, sr = math.cos(multiple * relative), math.sin(multiple * relative)

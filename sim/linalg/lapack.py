@@ -19,12 +19,9 @@ _TYPES = {"d": _POINTER, "i": _INTEGER, "c": _CHARACTER}
 
 
 def _routine(library: str, name: str, arguments: str) -> Callable[..., None]:
-    """Looks a routine up by symbol, so that compiled callers can be cached across processes.
+    """Looks a routine of "blas" or "lapack" up, so that compiled callers can be cached.
 
-    Args:
-        library: "blas" or "lapack".
-        name: of the routine.
-        arguments: a letter for each pointer: d double, i integer, c character.
+    The arguments are a letter for each pointer: d double, i integer, c character.
     """
     symbol = f"sim_{name}"
     binding.add_symbol(symbol, get_cython_function_address(f"scipy.linalg.cython_{library}", name))

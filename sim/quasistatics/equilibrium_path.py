@@ -154,21 +154,13 @@ def _leave(
     motion: Floats, load: Floats, ahead: float, mode: Floats, sense: float, first: float,
     drag: Floats, relative: float, absolute: float, system: System, work: Workspace, counts: Ints,
 ) -> tuple[float, int]:  # fmt: skip
-    """Goes on from the end of a path by damped motion.
+    """Goes on from the end of a path by damped motion; returns the part of the way gone, and how.
 
-    Args:
-        motion: at the end of the path; moved.
-        load: (n_held,).
-        ahead: part of the way there that leads beyond the end.
-        mode: (n_free,) filled with the critical one, S v.
-        sense: in which a branching is left: 1 moves along the mode, -1 against it.
-        first: eigenvalue of the first state.
-        drag: of the damped motion.
-        relative: tolerance of the residual, relative to the largest reaction.
-        absolute: its floor, N.
-        system: the structure.
-        work: holds a factor of the tangent, and one of that in the new state after it.
-        counts: gathers the work.
+    `motion`, at the end, is moved; `ahead` is the part of the way to `load` (n_held,) beyond it.
+    `mode` (n_free,) is filled with the critical one, S v; a branching is left along it (`sense` 1)
+    or against it (-1). `first` is the eigenvalue of the first state. Tolerances are those of
+    `follow`. The workspace holds a factor of the tangent before and after. The part is negative if
+    the structure came to no rest.
 
     Returns:
         the part of the way gone, negative if the structure came to no rest; and the kind of the
@@ -252,21 +244,9 @@ def _advance(
 ) -> tuple[float, int, float]:  # fmt: skip
     """Follows the path to one load; the workspace holds a factor of the tangent before and after.
 
-    Args:
-        motion: moved.
-        load: (n_held,).
-        number: of the load.
-        sense: see ``_leave``.
-        pace: (4,) see ``INCREMENT``; changed.
-        mode: (n_free,) eigenvector of the smallest eigenvalue, S v; changed.
-        predicted: (n_dofs,) scratch.
-        drag: of the damped motion.
-        relative: tolerance of the residual, relative to the largest reaction.
-        absolute: its floor, N.
-        system: the structure.
-        work: see above.
-        snaps: gathers them, see ``Branch``.
-        counts: gathers the work.
+    `motion` is moved; `load` (n_held,) is that of `number`; `pace` (4,), see ``INCREMENT``, and
+    `mode` (n_free,), the eigenvector S v of the smallest eigenvalue, change; `predicted` (n_dofs,)
+    is scratch. For the rest see `_leave`; `snaps` gathers them, see ``Branch``.
 
     Returns:
         the fraction of the way reached, with ``motion`` there; the kind of the way; and where on it
@@ -345,18 +325,11 @@ def follow(
 ) -> tuple[int, float]:  # fmt: skip
     """Fills a branch with the equilibria at ``loads`` (n_loads, n_held).
 
-    Args:
-        loads: the path.
-        bends: (n_loads, n_dofs) by how much the path of a similar structure departs from its
-            tangent between two loads, to be tried first.
-        trusted: (n_loads,) whether to try that.
-        sense: in which the critical mode of a branching is followed, 1 or -1.
-        system: the structure.
-        relative: tolerance of the residual, relative to the largest reaction.
-        absolute: its floor, N.
-        drag: (n_dofs,) of the damped motion after a snap.
-        branch: filled.
-        counts: (4,) gathers the work.
+    `bends` (n_loads, n_dofs) is by how much the path of a similar structure departs from its
+    tangent between two loads, to be tried first where `trusted` (n_loads,). The critical mode of a
+    branching is followed in the `sense` 1 or -1. The residual's tolerance is relative to the
+    largest reaction, its floor `absolute` in N; `drag` (n_dofs,) is that of the damped motion after
+    a snap; `counts` (4,) gathers the work.
 
     Returns:
         the number of loads reached, and the fraction of the way to the next.

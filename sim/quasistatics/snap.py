@@ -40,12 +40,9 @@ def lowest_mode(
 ) -> float:
     """Finds the smallest eigenvalue (N/mm) of K v = lambda S^2 v by inverse iteration.
 
-    Args:
-        system: the structure; S is its scale.
-        work: holds the factor of the tangent K.
-        mode: (n_free,) an estimate of the eigenvector S v, replaced by a better one of length 1.
-        sweeps: at most.
-        tolerance: relative change of the eigenvalue that ends them.
+    S is the system's scale; the workspace holds the factor of the tangent K. `mode` (n_free,) is an
+    estimate of the eigenvector S v, replaced by a better one of length 1 after so many `sweeps` or
+    once the eigenvalue changes, relatively, by less than the tolerance.
     """
     value = np.inf
     for _ in range(sweeps):
@@ -83,14 +80,9 @@ def relax(
 ) -> bool:  # fmt: skip
     """Follows the damped motion from ``motion`` at fixed held dofs to its rest, a minimum.
 
-    Args:
-        motion: (n_dofs,) moved.
-        drag: (n_dofs,) C, the viscous damping; its unit is of no account.
-        relative: tolerance of the residual at rest, relative to the largest reaction.
-        absolute: its floor, N.
-        system: the structure.
-        work: overwritten but for ``saved``; holds a factor of the tangent at rest after it.
-        counts: gathers the work.
+    `motion` (n_dofs,) is moved; `drag` (n_dofs,) is C, the viscous damping, its unit of no account.
+    The residual at rest is `relative` to the largest reaction, its floor `absolute` in N. The
+    workspace is overwritten but for ``saved``, and holds a factor of the tangent at rest after it.
     """
     h = FIRST_STEP * drag[system.dofs].min() / float(np.median(system.net.law[:, 0]))
     near = AT_REST

@@ -135,11 +135,7 @@ def _loose_units(scene: Scene) -> Iterator[str]:
 
 
 def _size(scene: Scene, times: Floats) -> Iterator[str]:
-    """Estimates memory and time of a large structure.
-
-    Raises:
-        SceneError: it needs more memory than there is.
-    """
+    """Estimates memory and time of a large structure."""
     if count_unknowns(scene) < LARGE:
         return
     n, memory, seconds = estimate_cost(scene, times)
@@ -153,12 +149,7 @@ def _size(scene: Scene, times: Floats) -> Iterator[str]:
 
 
 def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iterator[str]:
-    """Checks what moves in a load case up to a time.
-
-    Raises:
-        SceneError: it is no series, leads beyond the lattice, starts with a jump, or moves the
-            structure as a rigid body.
-    """
+    """Checks what moves in a load case up to a time."""
     for one in single_motions(drive.motion):
         if isinstance(one, TimeSeries):
             _series(one, case, end)

@@ -223,14 +223,10 @@ def _shortened(
 ) -> tuple[S, float]:
     """Cuts steps until the error is allowed; also returns the estimate, over the allowed one.
 
-    Args:
-        rough: about half as accurate as the finer one.
-        finer: the first that may do; None for the rough one and that with half its steps.
-        cut: makes a solver with shorter steps that reduces an error (over the allowed one) to 1 if
-            it can, and says into how many parts they were cut.
-        order: of convergence, cautiously.
-        error: to compare solutions.
-        most: number of steps.
+    `rough` is about half as accurate as `finer`, the first that may do; without it the rough one
+    and that with half its steps are compared. `cut` makes a solver with shorter steps that reduces
+    an error (over the allowed one) to 1 if it can, and says into how many parts they were cut;
+    `order` is that of convergence, cautiously; `most` bounds the steps.
     """
     seen, rough = error.motions(rough)
     kept, finer = (rough, twice_as_fine(rough)) if finer is None else (None, finer)

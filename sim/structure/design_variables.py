@@ -180,11 +180,7 @@ def _end_image(lattice: Lattice, ends: Ints, operation: Floats) -> Ints:
 
 
 def _image(lattice: Lattice, points: Floats, operation: Floats) -> Ints:
-    """Finds the image (n,) of points (n, 2) among them under an operation about the middle.
-
-    Raises:
-        ValueError: some have none.
-    """
+    """Finds the image (n,) of points (n, 2) among them under an operation about the middle."""
     about = points - (lattice.site.min(axis=0) + lattice.site.max(axis=0)) / 2
     distance, image = KDTree(about).query(about @ operation.T)
     if len(points) and distance.max() > 1e-6 * lattice.spacing:

@@ -75,19 +75,10 @@ def adjoint(
     which: Ints,
     bars: Bars,
 ) -> bool:
-    """Reverse sweep of ``sim.time_integration.esdirk.march``.
+    """Reverse sweep of ``sim.time_integration.esdirk.march``, of its grid and stages.
 
-    Args:
-        times: its grid.
-        stage_u: its displacements.
-        stage_v: its velocities.
-        stage_a: its accelerations.
-        bar_u: (n_steps + 1, n_dofs) loss derivatives by the displacement at the grid points.
-        bar_v: the same by the velocity.
-        system: the structure.
-        stages: coefficients of the method.
-        which: ligaments whose parameters are differentiated by.
-        bars: added to.
+    `bar_u`, `bar_v` (n_steps + 1, n_dofs) are loss derivatives by displacement and velocity at the
+    grid points; `which` are ligaments whose parameters are differentiated by; `bars` is added to.
 
     Returns:
         False if a stage's tangent is not positive definite.

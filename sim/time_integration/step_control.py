@@ -28,20 +28,12 @@ def adapted(
     stops: Floats = NOWHERE,
     most: float = np.inf,
 ) -> ImplicitSolver:
-    """Adapts the grid until every step's error estimate stays below ``tolerance``.
+    """Adapts the grid until every step's error estimate stays below ``tolerance``, mm.
 
     The estimate is the difference of the displacement to the embedded method of order 2, as the
-    root mean square over the free dofs (rotations times the topology's rotation scale), mm.
-
-    Args:
-        solver: its grid's ends are kept, and nothing else of the grid.
-        values: parameters of the structure.
-        drive: the case to adapt to.
-        tolerance: mm per step.
-        first: first step to try, s.
-        largest: no step is longer, s.
-        stops: (n,) times that steps end at, ascending within the grid, s.
-        most: number of steps.
+    root mean square over the free dofs (rotations times the topology's rotation scale), mm. Nothing
+    but the ends is kept of the solver's grid; the `first` step to try and the `largest` are in s;
+    steps end at `stops` (n,), ascending within the grid, s; `most` bounds their number.
 
     Raises:
         SimulationError: the step became too short to go on, or there are too many.

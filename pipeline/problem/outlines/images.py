@@ -92,11 +92,7 @@ def _of_pixels(dark: NDArray[np.uint8]) -> list[NDArray[Any]]:
 
 
 def _dark(held: bytes, threshold: float | None, invert: bool) -> NDArray[np.uint8]:
-    """Marks the pixels of an image's shape; transparent ones belong to its ground.
-
-    Raises:
-        UserError: unreadable, too large or not binary.
-    """
+    """Marks the pixels of an image's shape; transparent ones belong to its ground."""
     import cv2
 
     cv2.utils.logging.setLogLevel(
@@ -150,11 +146,7 @@ def _of_drawing(path: Path) -> list[NDArray[Any]]:
 
 
 def _parsed(path: Path) -> tuple[list[Any], list[SvgPath]]:
-    """Returns the elements of a drawing, and those that have an outline as paths.
-
-    Raises:
-        ValueError: they cannot be read.
-    """
+    """Returns the elements of a drawing, and those that have an outline as paths."""
     from svgelements import SVG, Shape
     from svgelements import Path as Curve
 
@@ -166,11 +158,7 @@ def _parsed(path: Path) -> tuple[list[Any], list[SvgPath]]:
 
 
 def _check_outlines(elements: list[Any], paths: list[SvgPath]) -> None:
-    """Refuses text, and lines that enclose nothing.
-
-    Raises:
-        UserError: there are some.
-    """
+    """Refuses text, and lines that enclose nothing."""
     from svgelements import Close, Text
 
     if any(isinstance(element, Text) for element in elements):
@@ -187,11 +175,7 @@ def _check_outlines(elements: list[Any], paths: list[SvgPath]) -> None:
 
 
 def _check_depth(path: Path) -> None:
-    """Refuses groups in groups without end, before anything follows them.
-
-    Raises:
-        ValueError: they are nested too deeply.
-    """
+    """Refuses groups in groups without end, before anything follows them."""
     depth = 0
     for event, element in ElementTree.iterparse(path, ("start", "end")):
         depth += 1 if event == "start" else -1
@@ -202,11 +186,7 @@ def _check_depth(path: Path) -> None:
 
 
 def _check_copies(drawing: ElementTree.Element) -> None:
-    """Refuses copies of copies, of which few lines make more than any memory holds.
-
-    Raises:
-        ValueError: there are some, or too many copies, or it is no drawing.
-    """
+    """Refuses copies of copies, of which few lines make more than any memory holds."""
     if drawing.tag.rpartition("}")[2] != "svg":
         raise ValueError("it does not begin with an element svg")
     elements = list(drawing.iter())

@@ -83,11 +83,7 @@ _Loader.add_implicit_resolver(  # of YAML 1.2: yes, no, on and off are texts
 
 
 def _refuse(event: yaml.Event) -> None:
-    """Refuses aliases, which can expand without bound, and tags, which ask for other types.
-
-    Raises:
-        yaml.MarkedYAMLError: the event is one.
-    """
+    """Refuses aliases, which can expand without bound, and tags, which ask for other types."""
     if isinstance(event, yaml.AliasEvent):
         what = "aliases (*name)"
     elif getattr(event, "tag", None) is not None:

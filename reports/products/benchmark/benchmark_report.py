@@ -66,12 +66,8 @@ def _values(
         "references": list(dict.fromkeys(data.attrs["reference"] for data in fresh.values())),
         "points": {table.name: (list(table.columns), list(tables.rows(table))) for table in own},
         "failed": [one for data in fresh.values() for one in tables.failures(data)],
-        "provenance": {name: _attributes(data) for name, data in fresh.items()},
+        "provenance": {name: sorted(data.attrs.items()) for name, data in fresh.items()},
     }
-
-
-def _attributes(data: xr.Dataset) -> list[tuple[str, str]]:
-    return sorted((str(key), str(value)) for key, value in data.attrs.items())
 
 
 def _machines(given: Iterable[xr.Dataset]) -> list[str]:
