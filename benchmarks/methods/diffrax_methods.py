@@ -95,7 +95,6 @@ def _prepare(name: str, pose: Pose, value: float, task: Task) -> Run:
 
 
 def _called(compiled: Callable[[Array], Any], value: Array) -> Any:  # noqa: ANN401
-    """Calls it and waits for the result."""
     try:
         found = compiled(value)
         jax.block_until_ready(found)  # type: ignore[no-untyped-call]

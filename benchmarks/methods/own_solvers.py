@@ -63,8 +63,7 @@ def differences(name: str) -> Method:
     return Method("central differences", partial(_differences, name), settings, tasks=("gradient",))
 
 
-def _differences(name: str, apart: float, task: Task) -> Run:
-    del task
+def _differences(name: str, apart: float, _: Task) -> Run:
     posed = case(name)
     solver = make_plan(posed.scene).solver
 

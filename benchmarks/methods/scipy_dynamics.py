@@ -83,8 +83,7 @@ def in_time(name: str, tolerances: tuple[float, ...]) -> tuple[Method, ...]:
     )
 
 
-def _prepare(name: str, method: str, tolerance: float, task: Task) -> Run:
-    del task
+def _prepare(name: str, method: str, tolerance: float, _: Task) -> Run:
     posed = case(name)
     system, rest = FirstOrderSystem(posed, posed.values), np.zeros(2 * posed.scene.topology.n_free)
 

@@ -67,8 +67,7 @@ def at_rest(name: str, tolerances: tuple[float, ...]) -> tuple[Method, ...]:
     )
 
 
-def _prepare(name: str, method: Callable[..., Floats], tolerance: float, task: Task) -> Run:
-    del task
+def _prepare(name: str, method: Callable[..., Floats], tolerance: float, _: Task) -> Run:
     posed = case(name)
     EquilibriumProblem(posed).tangent(np.zeros(posed.scene.topology.n_dofs))
 

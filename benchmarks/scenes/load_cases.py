@@ -160,7 +160,6 @@ def _small(
     drive: PrescribedMotion,
     **changes: Any,  # noqa: ANN401
 ) -> Scene:
-    """Poses a scene of the paper on 5 x 5 units."""
     return scene.updated(
         lattice=quads(5, 5, 15.0, 2.25, np.deg2rad(20.0)),
         supports=(Clamp(clamped),),

@@ -34,7 +34,6 @@ class RandomDesigns:
 
     @cached_property
     def _variables(self) -> tuple[Ints, Ints]:
-        """Returns the pattern of the constraints' Jacobian: rows and the variables in them."""
         size = self._constraints.space.n_variables
         pattern = self._constraints(np.zeros(size))[1].tocoo()
         row, variable = pattern.coords

@@ -47,7 +47,7 @@ class Skip:
     repeats: int | None = None  # at most so many runs; the first alone if that is measured
 
 
-def unloaded_reference(name: str, skipped: float, task: Task) -> Run:
+def unloaded_reference(name: str, skipped: float, _: Task) -> Run:
     """Compares the region with the unloaded lattice at rest, or with its simulation."""
     posed = load_cases.case(name)
     solver = make_plan(posed.scene).solver
@@ -58,7 +58,6 @@ def unloaded_reference(name: str, skipped: float, task: Task) -> Run:
         moved, *_ = solve_cases(solver, posed.values, posed.scene.loads.cases)
         return Sample(posed.results(*posed.measured(moved - rest, posed.values)), {})
 
-    del task
     return warmed_up(loss_run(posed, solver) if skipped else simulated)
 
 
@@ -67,21 +66,19 @@ def _still(motion: object) -> Harmonic | LinearRamp:
     return motion._replace(amplitude=0.0)
 
 
-def distant_contact(name: str, skipped: float, task: Task) -> Run:
+def distant_contact(name: str, skipped: float, _: Task) -> Run:
     """Evaluates contact in ligaments whose voids are wide open, or checks it after the run.
 
     On implicit steps, whichever the plan chooses: explicit ones evaluate every ligament.
     """
-    del task
     solver = make_plan(load_cases.scene(name).updated(integrator="implicit")).solver
     assert isinstance(solver, ImplicitSolver)
     used = solver if skipped else replace(solver, turn_allowance=np.inf)
     return warmed_up(loss_run(load_cases.case(name), used))
 
 
-def inertia(name: str, skipped: float, task: Task) -> Run:
+def inertia(name: str, skipped: float, _: Task) -> Run:
     """Solves a slow load as equilibria, or as the motion that it is."""
-    del task
     scene = load_cases.scene(name)
     (ramp,) = scene.loads.motions
     assert isinstance(ramp, LinearRamp)
@@ -96,9 +93,8 @@ def inertia(name: str, skipped: float, task: Task) -> Run:
     return warmed_up(loss_run(posed, plan.solver))
 
 
-def other_outputs(name: str, skipped: float, task: Task) -> Run:
+def other_outputs(name: str, skipped: float, _: Task) -> Run:
     """Observes energies, reactions and void angles at every sample, without need."""
-    del task
     posed = load_cases.case(name)
     solver = make_plan(posed.scene).solver
 
@@ -111,9 +107,8 @@ def other_outputs(name: str, skipped: float, task: Task) -> Run:
     return warmed_up(run)
 
 
-def far_derivatives(name: str, skipped: float, task: Task) -> Run:
+def far_derivatives(name: str, skipped: float, _: Task) -> Run:
     """Differentiates by the parameters of ligaments that the design does not move."""
-    del task
     posed = load_cases.case(name)
     solver = make_plan(posed.scene).solver
     if not skipped:
@@ -121,9 +116,8 @@ def far_derivatives(name: str, skipped: float, task: Task) -> Run:
     return warmed_up(gradient_run(posed, solver, {}))
 
 
-def equal_cases(name: str, skipped: float, task: Task) -> Run:
+def equal_cases(name: str, skipped: float, _: Task) -> Run:
     """Solves load cases that are copies of others, turned by a quarter."""
-    del task
     scene = load_cases.symmetric(name)
     evaluate = Evaluator(scene, make_plan(scene, every_case=not skipped))
     start = np.zeros(scene.space.n_variables)
@@ -135,9 +129,8 @@ def equal_cases(name: str, skipped: float, task: Task) -> Run:
     return warmed_up(run)
 
 
-def cold_start(name: str, skipped: float, task: Task) -> Run:
+def cold_start(name: str, skipped: float, _: Task) -> Run:
     """Follows paths from rest for every design, or from the last design's."""
-    del task
     return warm.walk(load_cases.scene(name), 1e-10, warm=bool(skipped))
 
 

@@ -16,9 +16,8 @@ from sim import quasistatics, time_integration
 from sim import scene as sim_scene
 
 
-def compilation(name: str, skipped: float, task: Task) -> Run:
+def compilation(name: str, skipped: float, _: Task) -> Run:
     """Times the first result of a process, with its loops from the disk or compiled for it."""
-    del task
 
     def run() -> Sample:
         if skipped:
@@ -29,12 +28,11 @@ def compilation(name: str, skipped: float, task: Task) -> Run:
     return run
 
 
-def factors(name: str, skipped: float, task: Task) -> Run:
+def factors(name: str, skipped: float, _: Task) -> Run:
     """Keeps factors while they converge, or makes a new one for every Newton step.
 
     On implicit steps, whichever the plan chooses: explicit ones have no factors.
     """
-    del task
     if skipped:
         return _default(name, integrator="implicit")
     with _no_cache():

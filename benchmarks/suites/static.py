@@ -111,9 +111,8 @@ def strict(sides: tuple[int, ...]) -> Run:
     return run
 
 
-def grown(way: str, side: float, task: str) -> Run:
+def grown(way: str, side: float, _: str) -> Run:
     """Prepares one size by one of the WAYS."""
-    del task
     return _solve(int(side), None if way == "Newton, by size" else False)
 
 

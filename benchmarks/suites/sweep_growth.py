@@ -48,9 +48,8 @@ def measure(
     return measured
 
 
-def cases(preset: str | None, count: float, task: str = "loss") -> Run:
+def cases(preset: str | None, count: float, _: str = "loss") -> Run:
     """Prepares the first ``count`` cases, after one that compiles."""
-    del task
     asked, wanted = load(PROBLEM, preset), Sweep.model_validate(SWEEP)
     design = _unchanged(asked)
     every = list(islice(sweep_cases.list_settings(wanted), int(count)))
@@ -67,7 +66,6 @@ def cases(preset: str | None, count: float, task: str = "loss") -> Run:
 
 
 def _unchanged(asked: Problem) -> xr.Dataset:
-    """Returns the initial structure as a design has it."""
     lattice = lattice_of(asked)
     free = np.full((lattice.n_ligaments, 2), np.nan)
     return xr.Dataset(

@@ -88,7 +88,6 @@ def _under_hand(place: Floats, times: Floats) -> Mask:
 
 
 def _bolts(image: Singles, time: float) -> None:
-    """Draws bolts, tape and a shadow beside the units."""
     del time
     for x, y, radius in ((30, 30, 17), (612, 28, 19), (28, 610, 18), (610, 612, 17), (20, 330, 15)):
         cv2.circle(image, (x, y), radius, 35.0, -1, cv2.LINE_AA)

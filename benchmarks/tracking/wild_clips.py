@@ -149,7 +149,6 @@ def make(name: str, folder: Path, frames: int | None = None) -> WildClip:
 
 
 def _in_view(shown: SpecimenOutlines, script: ClipScript, times: Floats, seen: Motion) -> Mask:
-    """Tells which units (times, units) are whole in view."""
     view, middle = script.view, shown.centre.mean(axis=0)
     place = view.project(shown.centre + seen(times)[..., :2] - middle)
     reach = shown.radius * view.scale

@@ -66,7 +66,6 @@ def _by_peaks(each: Experiment) -> tuple[float, float]:
 
 
 def _points(fit: Fit) -> dict[str, tuple[str, Floats]]:
-    """Lists all measured values with their fit."""
     every = [each.measured for each in fit.model.experiments]
     return {
         "set_of_point": ("point", fit.model.set_of_row),

@@ -125,7 +125,6 @@ def _located(asked: SpecimenPicture, folder: Path) -> xr.Dataset:
 
 
 def _outlines(network: Lattice) -> SpecimenOutlines:
-    """Shows a lattice of quadrilaterals as a camera sees it."""
     corners = network.vertices.reshape(network.n_units, -1, 2)
     centre = corners.mean(axis=1)
     joined = np.zeros(network.n_vertices, bool)

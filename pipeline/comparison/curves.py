@@ -74,7 +74,6 @@ def peak_to_peak(motion: Floats) -> Floats:
 
 
 def _highest(motion: Floats) -> Floats:
-    """Computes the highest value (..., units, 3) along the frames."""
     values = np.where(np.isfinite(motion), motion, -np.inf)
     at = values.argmax(axis=-3, keepdims=True)
     near = [np.clip(at + step, 0, motion.shape[-3] - 1) for step in (-1, 0, 1)]

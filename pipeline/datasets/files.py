@@ -118,7 +118,6 @@ def _check_kept(attributes: dict[Any, Any], sealed: seal.State, path: Path) -> N
 
 
 def _loaded(path: Path) -> xr.Dataset:
-    """Loads a file into memory."""
     with xr.open_dataset(
         path, engine="netcdf4", decode_times=False, decode_timedelta=False
     ) as opened:

@@ -208,7 +208,6 @@ def _path(solved: Solved, at: Ints) -> _Path:
 
 
 def _traced(solved: Solved, scene: Scene) -> TracedPath:
-    """Traces the path that the first snap leaves."""
     record, case, top = solved.record, solved.case, scene.topology
     found = None
     if isinstance(record, StaticRecord) and isinstance(case.solver, StaticSolver):

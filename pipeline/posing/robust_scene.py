@@ -59,7 +59,6 @@ def load_family(asked: Problem, folder: Path) -> LoadFamily | None:
 
 
 def _under(asked: Problem, load: Load) -> Problem:
-    """Puts the problem under another load."""
     assert isinstance(asked.drive, HarmonicDrive | RampHarmonicDrive)
     changed = load.model_dump(include={"amplitude", "frequency"}, exclude_none=True)
     return asked.model_copy(update={"drive": asked.drive.model_copy(update=changed)})

@@ -148,7 +148,6 @@ def _loads(
 
 
 def _selected(problem: Problem, units: Selector, lattice: Lattice) -> NDArray[np.int64]:
-    """Finds the places of selected units in a network."""
     return lattice.positions(_units(problems.selected_units(units, problem.lattice)))
 
 
@@ -271,7 +270,6 @@ def motions_of(problem: Problem, folder: Path) -> tuple[loads.MotionLaw, ...]:
 
 
 def _motions(drive: SingleDrive, horizon: float, folder: Path) -> tuple[loads.MotionLaw, ...]:
-    """Builds the motion of a drive, or its force, in every load case."""
     if isinstance(drive, TimeSeriesDrive):
         return (_measured(folder / drive.file),)
     if isinstance(drive, TorqueDrive | RotationDrive):

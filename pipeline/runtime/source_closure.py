@@ -40,7 +40,6 @@ def _tree_hash(root: Path) -> str:
 
 
 def _kept_hashes(store: Path, tree: str) -> dict[str, str]:
-    """Reads the hashes of modules that were kept for this very tree."""
     try:
         kept = json.loads(store.read_bytes())
         return dict(kept["hashes"]) if kept["tree"] == tree else {}

@@ -114,7 +114,6 @@ def _weigh(path: Path, response: Path, out: Path) -> None:
 
 
 def _virtual(path: Path) -> tuple[Recording, VirtualRecording]:
-    """A recording and how it is rendered."""
     asked = recordings.load_recording(path)
     if asked.virtual is None:
         remedy = "track it (python -m pipeline track), or say under `virtual` how to render it"
@@ -133,7 +132,6 @@ def _shown(asked: Recording, response: Path) -> xr.Dataset:
 def _described(
     asked: Recording, virtual: VirtualRecording, video: Path, design: Path
 ) -> dict[str, object]:
-    """Keys and values of a recording of the rendered video."""
     cell = virtual.load_cell
     log = None if cell is None else {"file": f"{video.stem}_load.csv", "offset": cell.offset}
     return {

@@ -120,5 +120,4 @@ def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
 
 
 def _of(scene: Scene, vertices: NDArray[np.float64]) -> float:
-    """The combined loss of one structure."""
     return float(simulate(scene, vertices=vertices, plan=make_plan(scene, vertices)).loss)

@@ -152,7 +152,6 @@ def _track(path: Path, args: argparse.Namespace) -> None:
 
 
 def _sources(asked: Recording, path: Path, study: Path | None) -> tuple[Path, Path]:
-    """The files of the video and of the design."""
     if asked.video is None:
         remedy = "render it first (python -m pipeline film) and track the YAML beside it"
         raise UserError("a recording without a video", file=path, key="virtual", remedy=remedy)

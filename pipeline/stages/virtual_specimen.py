@@ -61,7 +61,6 @@ def dataset(asked: Problem, held: dict[str, PosedStructure], recording: Recordin
 
 
 def _asked_for(held: dict[str, PosedStructure], recording: Recording) -> PosedStructure:
-    """The structure that a recording shows."""
     structure = held.get(recording.structure)
     if structure is None:
         remedy = f"give one of: {', '.join(held)}"

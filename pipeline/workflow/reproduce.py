@@ -38,7 +38,6 @@ def _files(folder: Path) -> dict[str, str]:
 
 
 def _built(target: str, folder: Path) -> Path:
-    """Builds a target from nothing in `folder`, and returns its results."""
     folder.mkdir()
     for name in SOURCES:
         (folder / name).symlink_to(ROOT / name)

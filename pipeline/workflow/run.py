@@ -76,7 +76,6 @@ def _others() -> list[psutil.Process]:
 
 
 def _is_snakemake(process: psutil.Process) -> bool:
-    """Tells whether the process is a snakemake in this folder."""
     try:
         names = {Path(word).name for word in process.cmdline()[:2]}
         return "snakemake" in names and Path(process.cwd()) == WORK

@@ -1,7 +1,6 @@
 """Tells how to cite this software, in words and as BibTeX, from CITATION.cff."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,23 +10,14 @@ import yaml
 FILE = Path(__file__).resolve().parents[2] / "CITATION.cff"
 
 
-@dataclass(frozen=True)
-class Citation:
-    """Describes one work to cite: what it is for, in words, and as BibTeX."""
-
-    what: str
-    words: str
-    bibtex: str
-
-
 @cache
-def citations() -> tuple[Citation, ...]:
-    """Returns the paper, the software and the paper's data, in this order."""
+def citations() -> tuple[tuple[str, str, str], ...]:
+    """Lists the paper, the software and the paper's data: each in words, and as BibTeX."""
     known = yaml.safe_load(FILE.read_text(encoding="utf-8"))
     paper = known["preferred-citation"]
     works = [("The paper", paper), ("This software", known)]
     works += [("The paper's data", data) for data in known.get("references", ())]
-    return tuple(Citation(what, _words(work), _bibtex(work)) for what, work in works)
+    return tuple((what, _words(work), _bibtex(work)) for what, work in works)
 
 
 def _words(work: Mapping[str, Any]) -> str:

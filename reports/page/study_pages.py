@@ -73,12 +73,8 @@ def study_text(
     return PageText(title, lead, credit, figure_title, caption, shown, note, robust)
 
 
-@dataclass(frozen=True)
-class Source:
-    """Describes names a part of the page, a dataset say, with its attributes."""
-
-    name: str
-    entries: Sequence[tuple[str, str]]
+Source = tuple[str, list[tuple[str, str]]]
+"""Names a part of the page, a dataset say, with its attributes."""
 
 
 def study_page(
@@ -135,7 +131,6 @@ def study_page(
 
 
 def _json(problem: Problem | Mapping[str, Problem]) -> str:
-    """Returns a problem as resolved, or several by name, as indented JSON."""
     if isinstance(problem, Problem):
         content = json.loads(canonical_json(problem))
     else:
@@ -192,7 +187,7 @@ def sources(study: StudyResults, label: str = "") -> Iterator[Source]:
 def _source(name: str, data: xr.Dataset) -> Source:
     """Returns attributes of a dataset, except the problem, which the page shows once."""
     kept = {str(key): value for key, value in data.attrs.items() if key != "problem"}
-    return Source(name, [entry for key in sorted(kept) for entry in _entries(key, kept[key])])
+    return name, [entry for key in sorted(kept) for entry in _entries(key, kept[key])]
 
 
 def _entries(key: str, value: object) -> list[tuple[str, str]]:

@@ -38,7 +38,6 @@ def element(svg: str) -> str:
 
 
 def _symbols(text: str) -> Markup:
-    """Returns escaped text in which u_y has its index."""
     return Markup(re.sub(r"\bu_([xy])\b", r"u<sub>\1</sub>", str(escape(text))))
 
 

@@ -96,7 +96,6 @@ def _tables(data: xr.Dataset) -> list[Table]:
 
 
 def _harmonic(data: xr.Dataset) -> bool:
-    """Tells loads that have a frequency."""
     return bool(data["load_frequency"].notnull().all())
 
 

@@ -54,7 +54,6 @@ def report(args: argparse.Namespace) -> None:
 
 
 def _at_rest(asked: Problem, scene: Scene) -> xr.Dataset:
-    """Lays out the lattice with its void as responses have it."""
     intact, lattice = lattice_of(asked), scene.lattice
     places = spread(lattice.padded(lattice.vertices), lattice, intact.n_units)
     variables = {
@@ -66,7 +65,6 @@ def _at_rest(asked: Problem, scene: Scene) -> xr.Dataset:
 
 
 def _removed(axes: Axes, asked: Problem, scene: Scene) -> None:
-    """Draws the units that the void removes, dashed."""
     intact = lattice_of(asked)
     gone = np.setdiff1d(intact.id, scene.lattice.id)
     rings = [ring[np.isfinite(ring[:, 0])] for ring in intact.padded(intact.vertices)[gone]]

@@ -23,7 +23,6 @@ def report(args: argparse.Namespace) -> None:
 
 
 def _families(path: Path) -> list[dict[str, Any]]:
-    """Returns the record of every family."""
     try:
         families = json.loads(path.read_text(encoding="utf-8"))["families"]
         return [each | {key: int(each[key]) for key in COLUMNS} for each in families]

@@ -245,7 +245,6 @@ def worst(
 def _measured(
     measures: tuple[Callable[[Array], Array], ...], places: tuple[Ints, ...], points: Floats
 ) -> list[Array]:
-    """Measures at all places, compiled as one."""
     corners = jnp.asarray(points)
     return [jax.vmap(of)(corners[at]) for of, at in zip(measures, places, strict=True)]
 

@@ -229,7 +229,6 @@ def _step_ahead(
 
 @inlined
 def _note(snaps: Floats, place: float) -> None:
-    """Appends a snap to those recorded."""
     for i in range(len(snaps)):
         if np.isnan(snaps[i]):
             snaps[i] = place

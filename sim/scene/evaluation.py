@@ -94,7 +94,6 @@ class GradientChain:
 
 
 def _started(solver: Solver, memory: Memory | None) -> list[Solver] | None:
-    """Starts the solver of each case from the path remembered, if there is one."""
     if memory is None or not isinstance(solver, StaticSolver):
         return None
     records = memory.start()

@@ -160,7 +160,6 @@ def drive_force(scene: Scene, seen: Observables, drive: PrescribedMotion, times:
 
 
 def _solved(response: Response, solvers: tuple[Solver, ...]) -> Response:
-    """Solves the cases of a response by other solvers."""
     drives = [response.scene.loads.cases[case] for case in response.cases]
     solver = response.plan.solver
     displacement, velocity, made = solve_cases(solver, response.parameters, drives, solvers)

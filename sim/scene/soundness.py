@@ -123,7 +123,6 @@ def check_cases(scene: Scene, numbers: Iterable[int]) -> None:
 
 
 def _loose_units(scene: Scene) -> Iterator[str]:
-    """Warns of units that a single ligament holds."""
     count = np.bincount(scene.lattice.ligament_units.ravel(), minlength=scene.lattice.n_units)
     loose = np.setdiff1d(np.flatnonzero(count == 1), scene.loads.held // 3)
     if len(loose) > 0:
@@ -149,7 +148,6 @@ def _size(scene: Scene, times: Floats) -> Iterator[str]:
 
 
 def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iterator[str]:
-    """Checks what moves in a load case up to a time."""
     for one in single_motions(drive.motion):
         if isinstance(one, TimeSeries):
             _series(one, case, end)

@@ -73,7 +73,6 @@ def perturbed(
 def _varied(
     lattice: Lattice, material: Material, sizes: Perturbation, random: np.random.Generator
 ) -> Material:
-    """Draws the stiffnesses of the ligaments and the damping of the units."""
     own = _factors((3, lattice.n_ligaments), sizes.ligaments, random)
     common = _factors((3, 1), sizes.stiffness, random)
     damping = _factors((lattice.n_units,), sizes.units, random)

@@ -165,7 +165,6 @@ def _nonsense() -> Iterator[StressCase]:
 
 
 def _spoilt(name: str, solver: Solver, field: str, value: float) -> Sequence[Check]:
-    """Replaces one number of a field."""
     case = pressed(squares(5), 0.05) if name == "static" else _case()
     bad = np.array(getattr(case.values, field))
     bad.flat[len(bad.flat) // 2] = value

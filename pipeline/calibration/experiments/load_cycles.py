@@ -151,7 +151,6 @@ def _from_start(branch: LoadBranch, options: RecordOptions) -> tuple[Floats, Flo
 
 
 def _reaches(way: Floats, load: Floats, level: float) -> float:
-    """Interpolates where a branch reaches a force first."""
     above = load >= level
     k = int(np.argmax(above))
     if not above.any():

@@ -152,7 +152,6 @@ def _held_courses(
 
 
 def _powers_of_two(most: int) -> list[int]:
-    """Lists 1, 2, 4 and so on, up to a number."""
     return [1 << k for k in range(most.bit_length())]
 
 

@@ -149,7 +149,6 @@ def draw_constants(asked: Population, folder: Path, count: int) -> Floats:
 def _emulated(
     asked: Population, folder: Path, begin: Constants
 ) -> tuple[list[SampleCurve], dict[TestKind, CurveEmulator]]:
-    """Reads the curves of the fit, and emulates every kind of test."""
     curves = [read_curve(each, folder) for each in asked.data]
     return curves, {
         kind: emulate(asked.lattice, kind, begin, far) for kind, far in ends(curves).items()

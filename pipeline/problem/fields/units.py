@@ -115,7 +115,6 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
 
 @lru_cache
 def _factor(unit: str, dimension: Dimension, wanted: str) -> float:
-    """Converts one `unit` to working units of `dimension`."""
     from pint.errors import UndefinedUnitError
 
     registry = _registry()

@@ -79,7 +79,6 @@ def _contact_distance(problem: Problem) -> Findings:
 
 
 def _foil(problem: Problem) -> Findings:
-    """Compares the foil of the model with the foil that is cut."""
     strip, made = problem.material.foil, problem.fabrication
     if strip is None:
         return

@@ -128,7 +128,6 @@ class Normal(Section):
 
 
 def _form(value: object) -> str:
-    """Tells the form of a parameter's values."""
     if not isinstance(value, Mapping | Section):
         return "values"
     return "normal" if {"mean", "deviation"} & set(dict(value)) else "between"

@@ -96,7 +96,6 @@ def filmed(
 
 
 def _window(axes: Axes, window: tuple[Floats, float]) -> None:
-    """Shows a square about a point, in a frame."""
     (x, y), half = window
     axes.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")
     axes.set_axis_off()

@@ -62,7 +62,6 @@ def framework_figure(study: StudyResults) -> PanelFigure:
 
 
 def _problem(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
-    """Draws row a, left: reference and altered domain, and what is compared of them."""
     spacing = study.scene.spacing
     top = 11.0
     reference = style.place(figure, 0.0, top, SIDE, SIDE)

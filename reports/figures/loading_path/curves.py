@@ -244,7 +244,6 @@ def _sides(axes: Axes, study: StudyResults) -> None:
 def _plain_panel(
     axes: Axes, problem: Problem, path: Abscissa, values: xr.DataArray, label: str
 ) -> None:
-    """Draws a curve of every structure."""
     path_axes(axes, path, label)
     names = structures(values.to_dataset(name="values"))
     structure_curves(axes, problem, path, values, names)

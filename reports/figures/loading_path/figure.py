@@ -144,7 +144,6 @@ def _answer(study: StudyResults, path: Abscissa) -> Curve:
 
 
 def _side_by_side(shown: Sequence[Curve], top: float) -> Iterator[Panel]:
-    """Yields the panels of curves, lettered from d."""
     width = style.TWO_COLUMNS / len(shown)
     for k, (title, draw, words, data) in enumerate(shown):
         left = k * width

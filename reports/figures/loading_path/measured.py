@@ -109,7 +109,6 @@ def measured_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
 
 
 def _of(study: StudyResults, key: str, structure: str, value: float, /, **words: object) -> Fact:
-    """Makes a measured fact of a structure."""
     shown = display_name(study.problem, structure).lower()
     key = f"{{measured}}{key}"
     return _told(key, value, measured=MEASURED, structure=structure, shown=shown, **words)

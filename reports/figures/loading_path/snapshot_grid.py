@@ -138,7 +138,6 @@ def snapshots(
 def _labels(
     figure: Figure, grid: SnapshotLayout, top: float, above: Sequence[Label], left: Sequence[Label]
 ) -> None:
-    """Draws words with their colours above the columns and left of the lines."""
     for k, (text, colour) in enumerate(above):
         x = grid.left + (k + 0.5) * grid.side - GAP / 2
         style.write(

@@ -45,7 +45,6 @@ def several_designs_report(series: DesignSeries) -> Report:
 
 
 def _sizes(series: DesignSeries) -> Table:
-    """Returns one row a design."""
     columns: dict[str, Sequence[Any]] = {
         series.key: [str(design.word) for design in series.designs],
         "cloak_units": [design.units for design in series.designs],
@@ -58,7 +57,6 @@ def _sizes(series: DesignSeries) -> Table:
 
 
 def _peaks(series: DesignSeries) -> Table:
-    """Returns one row a unit."""
     first = series.designs[0]
     columns: dict[str, Any] = {
         name: first.study.response[name].values for name in ("unit", "i", "j")

@@ -97,7 +97,6 @@ def loss_facts(scene: ReportScene, response: xr.Dataset) -> Iterator[Fact]:
 
 
 def _loss(key: str, value: float, /, **words: object) -> Fact:
-    """Returns fact of a loss, to four decimals."""
     return _told(key, value, f"{value:.4f}", **words)
 
 

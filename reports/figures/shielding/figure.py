@@ -179,7 +179,6 @@ def _top_edge(scene: ReportScene, response: xr.Dataset) -> Columns:
 
 
 def _map(sweep: xr.Dataset) -> Columns:
-    """Returns one row a point of the map."""
     angle, rate = np.meshgrid(sweep["direction"], sweep["frequency"], indexing="ij")
     columns = {"direction_deg": angle.ravel(), "frequency_Hz": rate.ravel()}
     for column, name in (

@@ -155,7 +155,6 @@ def _over_time(study: StudyResults) -> Columns:
 
 
 def _steps(verification: xr.Dataset | None) -> list[Table]:
-    """Returns one row a check and structure."""
     if verification is None:
         return []
     checks, names = verification["check"].values, verification["structure"].values

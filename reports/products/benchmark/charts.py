@@ -75,7 +75,6 @@ def _lines(axes: Axes, measured: pd.DataFrame, of: str, column: str) -> None:
 
 
 def _pair(height: float, titles: tuple[str, str]) -> tuple[Figure, Axes, Axes]:
-    """Returns a page with two panels side by side."""
     figure = style.page(height)
     left = style.place(figure, 14.0, 9.0, 66.0, 46.0)
     right = style.place(figure, 106.0, 9.0, 66.0, 46.0)

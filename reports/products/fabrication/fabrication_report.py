@@ -6,7 +6,7 @@ what the file was meant to be. The same packages give the same bytes.
 
 import argparse
 import base64
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,8 @@ YIELD = 0.05
 makers' tensile curves leaves the straight line for good."""
 
 _HOWS = ("designed", "built")
+Picture = dict[str, str]
+"""Of a file (its path from the page): `file`, `caption`, and `png` as base64."""
 _BENT = "the specimen from the top, with the strain of every shim that is bent by its slots"
 
 
@@ -43,40 +45,6 @@ class PackageFact:
     value: str
     label: str
     note: str
-
-
-@dataclass(frozen=True)
-class FilePicture:
-    """Describes a picture of a file (its path from the page), as base64 of a PNG."""
-
-    file: str
-    caption: str
-    png: str
-
-
-@dataclass(frozen=True)
-class PictureGroup:
-    """Describes pictures under one heading."""
-
-    title: str
-    pictures: Sequence[FilePicture]
-
-
-@dataclass(frozen=True)
-class PackageSection:
-    """Holds one structure's part of the page.
-
-    Attributes:
-        foil: ways to handle the shims: name, parts, cuts with their length and time.
-        files: paths in its folder and their hashes.
-    """
-
-    name: str
-    title: str
-    facts: Sequence[PackageFact]
-    groups: Sequence[PictureGroup]
-    foil: Sequence[tuple[str, str, str]]
-    files: Sequence[tuple[str, str]]
 
 
 def report(args: argparse.Namespace) -> None:
@@ -93,7 +61,7 @@ def report(args: argparse.Namespace) -> None:
         "lead": "Drawings for the laser cutter, plates for the printer, fixtures and papers.",
         "pens": [(name, colour) for name, colour in pictures.PENS.items() if name != "REFERENCE"],
         "structures": made,
-        "as_built": list(_as_built({made.name: read_manifest(p) for made, p in packages})),
+        "as_built": list(_as_built({made["name"]: read_manifest(p) for made, p in packages})),
         "parameters": list(parameters(asked.fabrication.model_dump(mode="json"))),
     }
     write_page(args.out, "fabrication.html.j2", values)
@@ -118,22 +86,22 @@ def _as_built(told: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, ...]
         yield "Loss J, cloaked over altered", *(f"{100 * ratio:.1f} %" for ratio in ratios)
 
 
-def package(folder: Path, problem: Problem) -> PackageSection:
+def package(folder: Path, problem: Problem) -> dict[str, Any]:
     """Tells what the page shows of a package, all of it read from the package's files."""
     told = read_manifest(folder)
     name = folder.name
-    return PackageSection(
-        name,
-        TITLES.get(name, name),
-        list(_facts(folder, told)),
-        [PictureGroup(title, list(found)) for title, found in _groups(folder, problem)],
-        [
+    return {
+        "name": name,
+        "title": TITLES.get(name, name),
+        "facts": list(_facts(folder, told)),
+        "groups": list(_groups(folder, problem)),
+        "foil": [
             (row["id"], row["count"], row["note"])
             for row in read_bill(folder / "bom.csv")
             if row["item"] == "foil"
         ],
-        sorted(told["files"].items()),
-    )
+        "files": sorted(told["files"].items()),
+    }
 
 
 def parameters(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, str]]:
@@ -184,35 +152,35 @@ def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[PackageFact]:
     yield PackageFact(took.removeprefix("about "), "print time, estimated", note)
 
 
-def _groups(folder: Path, problem: Problem) -> Iterator[tuple[str, Iterator[FilePicture]]]:
+def _groups(folder: Path, problem: Problem) -> Iterator[tuple[str, list[Picture]]]:
     colour = COLOURS.get(folder.name, FIXTURE)
     whole = folder / "print/assembled.stl"
     seen = _picture(whole, "the specimen as it is assembled", pictures.assembled(whole, colour))
-    yield "The specimen", iter([seen])
+    yield "The specimen", [seen]
     prebend = read_manifest(folder)["prebend"]
     if any(one["strain"] > STRAIGHT for one in prebend.values()):
         bent = _picture(whole, _BENT, pictures.prebend_map(whole, prebend.values()))
-        yield "Shims before any load", iter([bent])
-    yield "Sheets for the laser cutter", _sheets(folder)
-    yield "Plates for the printer", _plates(folder, "print", problem, colour)
-    yield "Fixtures", _plates(folder, "fixture", problem, FIXTURE)
+        yield "Shims before any load", [bent]
+    yield "Sheets for the laser cutter", list(_sheets(folder))
+    yield "Plates for the printer", list(_plates(folder, "print", problem, colour))
+    yield "Fixtures", list(_plates(folder, "fixture", problem, FIXTURE))
 
 
-def _sheets(folder: Path) -> Iterator[FilePicture]:
+def _sheets(folder: Path) -> Iterator[Picture]:
     for path in sorted(folder.glob("laser/*_nominal.dxf")):
         kind, number, _ = path.stem.split("_")
         told = f"{kind}, sheet {number.removeprefix('sheet')}, at nominal size"
         yield _picture(path, told, pictures.sheet(path))
 
 
-def _plates(folder: Path, kind: str, problem: Problem, colour: str) -> Iterator[FilePicture]:
+def _plates(folder: Path, kind: str, problem: Problem, colour: str) -> Iterator[Picture]:
     for path in sorted(folder.glob(f"{kind}/*.3mf")):
         name, number = path.stem.split("_")
         told = f"{name}, plate {number.removeprefix('plate')}"
         yield _picture(path, told, pictures.plate(path, problem.fabrication.print.bed, colour))
 
 
-def _picture(path: Path, caption: str, png: bytes) -> FilePicture:
+def _picture(path: Path, caption: str, png: bytes) -> Picture:
     folder = path.parent.parent
     file = f"{folder.name}/{path.relative_to(folder).as_posix()}"
-    return FilePicture(file, caption, base64.b64encode(png).decode("ascii"))
+    return {"file": file, "caption": caption, "png": base64.b64encode(png).decode("ascii")}

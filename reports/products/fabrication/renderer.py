@@ -170,7 +170,6 @@ def _edges(depth: AnyFloats, face: Integers, normals: AnyFloats) -> NDArray[np.b
 
 
 def _reduced(fine: AnyFloats) -> Image:
-    """Returns the mean of the samples of each pixel, as bytes."""
     rows, columns = fine.shape[0] // _SAMPLES, fine.shape[1] // _SAMPLES
     blocks = fine.reshape(rows, _SAMPLES, columns, _SAMPLES, 3)
     return np.round(255.0 * blocks.mean(axis=(1, 3))).astype(np.uint8)

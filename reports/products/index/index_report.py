@@ -7,13 +7,13 @@ import logging
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 
 from pipeline.datasets import git_commit, package_versions
 from pipeline.runtime import UserError
-from reports.facts import JudgedClaim, claims
+from reports.facts import claims
 from reports.page import citation, write_page
 from reports.products.index import inventory
 from reports.products.index.inventory import BuiltReport, Link
@@ -30,23 +30,6 @@ PROOFS = {
     "survival": "attempts to lose results",
 }
 """Pages beside those of the studies, by folder."""
-
-
-class Movie(NamedTuple):
-    """Describes a movie, and its bytes as base64 where the page holds it."""
-
-    link: Link
-    data: str
-
-
-class IndexTable(NamedTuple):
-    """Describes the claims on one figure of the paper; not built: `built` is None."""
-
-    name: str
-    title: str
-    built: BuiltReport | None
-    claims: list[JudgedClaim]
-    verdict: str
 
 
 def report(args: argparse.Namespace) -> None:
@@ -80,20 +63,20 @@ def _below(results: Path, fault: UserError) -> str:
     return file.relative_to(results).as_posix() if file.is_relative_to(results) else file.name
 
 
-def tables(built: Sequence[BuiltReport]) -> list[IndexTable]:
-    """Returns the claims by figure, of those that are built and of those that are not."""
+def tables(built: Sequence[BuiltReport]) -> list[dict[str, Any]]:
+    """Returns the claims by figure, of those that are built and of those that are not (None)."""
     by_name = {each.name: each for each in built}
     made = []
     for name in dict.fromkeys(claim.study for claim in claims.listed().claims):
         own = by_name.get(name)
         judged = claims.judged(name, own.facts if own else [])
-        title = f"Figure {name.removeprefix('fig')}"
-        made.append(IndexTable(name, title, own, judged, claims.verdict(judged)))
+        about = {"name": name, "title": f"Figure {name.removeprefix('fig')}", "built": own}
+        made.append(about | {"claims": judged, "verdict": claims.verdict(judged)})
     return made
 
 
-def movies(results: Path) -> list[Movie]:
-    """Returns all movies; the page holds as many of them as it has room for, the smallest first."""
+def movies(results: Path) -> list[tuple[Link, str]]:
+    """Lists all movies, with their bytes as base64 where the page has room, the smallest first."""
     links = inventory.others(results, "movies", "*.mp4")
     files = {link.address: (results / link.address).read_bytes() for link in links}
     held, room = set(), LARGEST_MOVIES
@@ -101,9 +84,7 @@ def movies(results: Path) -> list[Movie]:
         room -= len(files[address])
         if room >= 0:
             held.add(address)
-    return [
-        Movie(link, _base64(files[link.address]) if link.address in held else "") for link in links
-    ]
+    return [(link, _base64(files[link.address]) if link.address in held else "") for link in links]
 
 
 def proofs(results: Path) -> list[Link]:
@@ -134,6 +115,5 @@ def _base64(data: bytes) -> str:
 
 
 def _made() -> list[tuple[str, Any]]:
-    """Tells what made this page."""
     packages = dict(package_versions()) | {name: version(name) for name in ("jinja2", "matplotlib")}
     return [("git_commit", git_commit()), ("packages", json.dumps(packages, sort_keys=True))]

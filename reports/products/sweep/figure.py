@@ -97,7 +97,6 @@ def _is_wide(measure: SweepMeasure) -> bool:
 
 
 def _median(axes: Axes, places: Floats, values: Floats, colour: str) -> None:
-    """Draws medians of equally many cases each, along the axis."""
     there = np.isfinite(values)
     if there.sum() < _FEWEST:
         return

@@ -78,7 +78,6 @@ def _arrows(axes: Axes, specimen: SpecimenOutlines, residual: np.ndarray) -> Non
 
 
 def _axis(track: xr.Dataset, load_axis: str) -> tuple[np.ndarray, str]:
-    """Tells what the courses are drawn over (frames,), and its label."""
     if load_axis == "time":
         return track["time"].values, "time, s"
     moved = track["drive_displacement"].values

@@ -134,7 +134,6 @@ def _pixels(painted: Painter, points: Floats) -> NDArray[np.int32]:
 
 
 def _hatch(image: Image, polygon: NDArray[np.int32]) -> None:
-    """Draws slanted lines within the outline."""
     mask = np.zeros(image.shape[:2], np.uint8)
     cv2.fillPoly(mask, [polygon], 1, cv2.LINE_8, _SHIFT)
     rows, columns = np.nonzero(mask)

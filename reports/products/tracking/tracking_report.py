@@ -5,7 +5,6 @@ import io
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -21,14 +20,6 @@ from reports.page import templating, write_page
 from reports.products.tracking import advice, figure, overlay, track_quality
 from reports.products.tracking.track_quality import TrackQuality
 from sim.core import Image
-
-
-class Line(NamedTuple):
-    """Describes a line of the page's table."""
-
-    label: str
-    value: str
-    note: str = ""
 
 
 def report(args: argparse.Namespace) -> None:
@@ -66,7 +57,6 @@ def _check_origin(track: xr.Dataset, path: Path, video: Path) -> None:
 
 
 def _of_track(video: Path, asked: Recording, track: xr.Dataset) -> Iterator[Frame]:
-    """Yields the frames of the video that the track has."""
     wanted = set(track["frame"].values.tolist())
     end = np.inf if asked.window.end is None else asked.window.end
     shown = read_frames(video, asked.window.start, end, asked.frame_rate)
@@ -74,7 +64,6 @@ def _of_track(video: Path, asked: Recording, track: xr.Dataset) -> Iterator[Fram
 
 
 def _values(track: xr.Dataset, asked: Recording, found: TrackQuality) -> dict[str, object]:
-    """Tells what the page shows, its figure within it."""
     return {
         "title": asked.title or "Recording",
         "synthetic": track.attrs["synthetic"] == "yes",
@@ -93,28 +82,27 @@ def _drawn(track: xr.Dataset, found: TrackQuality, load_axis: str) -> str:
     return templating.element(held.getvalue())
 
 
-def _lines(track: xr.Dataset, found: TrackQuality) -> Iterator[Line]:
+def _lines(track: xr.Dataset, found: TrackQuality) -> Iterator[tuple[str, str, str]]:
+    """Yields what a line of the table is of, its value, and a note."""
     time = track["time"].values
     width, height = track["image_size"].values
     rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else float("nan")
-    yield Line("Frames", f"{len(time)}", f"{rate:.4g} per second, {width} × {height} px")
-    yield Line("Scale", f"{found.pixel:.4g} mm/px", f"{found.pitch:.3g} px from unit to unit")
-    yield Line("Blur at edges", f"{found.blur:.2f} px", "standard deviation")
-    yield Line("Stated uncertainty", *_accuracy(found.sigma, found.pixel))
+    yield "Frames", f"{len(time)}", f"{rate:.4g} per second, {width} × {height} px"
+    yield "Scale", f"{found.pixel:.4g} mm/px", f"{found.pitch:.3g} px from unit to unit"
+    yield "Blur at edges", f"{found.blur:.2f} px", "standard deviation"
+    yield "Stated uncertainty", *_accuracy(found.sigma, found.pixel)
     if np.isfinite(found.floor[0]):
-        yield Line(
-            f"Scatter in {found.resting} frames at rest", *_accuracy(found.floor, found.pixel)
-        )
+        yield f"Scatter in {found.resting} frames at rest", *_accuracy(found.floor, found.pixel)
     else:
-        yield Line("Scatter at rest", "not known", "no frames at rest in the beginning")
-    yield Line("First frame less design", f"{found.residual:.3f} px", "of the specimen's own make")
-    yield Line("Units lost", f"{100 * found.lost.sum(axis=1).mean():.3g} %", "of units and frames")
+        yield "Scatter at rest", "not known", "no frames at rest in the beginning"
+    yield "First frame less design", f"{found.residual:.3f} px", "of the specimen's own make"
+    yield "Units lost", f"{100 * found.lost.sum(axis=1).mean():.3g} %", "of units and frames"
     for label, numbers in (("Repeated", found.duplicates), ("Dropped", found.dropped)):
         told = ", ".join(map(str, numbers[:12])) + (", …" if len(numbers) > 12 else "")
-        yield Line(f"{label} frames", str(len(numbers)), told)
+        yield f"{label} frames", str(len(numbers)), told
     own = f"{100 * found.stream.alone:.0f} % of the frames are held whole"
     rest = "" if found.stream.alone > 0.995 else ", the others as changes"
-    yield Line("Codec", found.stream.codec, own + rest)
+    yield "Codec", found.stream.codec, own + rest
 
 
 def _accuracy(of: np.ndarray, pixel: float) -> tuple[str, str]:

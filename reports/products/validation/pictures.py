@@ -82,7 +82,6 @@ def _moved(outline: Floats, centre: Floats, motion: Floats) -> Floats:
 
 
 def _show(axes: Axes, image: Image, reach: tuple[Floats, Floats]) -> None:
-    """Shows part of a picture, itself cut, so that no more of it is in the file."""
     (left, top), (right, bottom) = (np.clip(end, 0, image.shape[::-1]).astype(int) for end in reach)
     cut = image[top:bottom, left:right]
     extent = (left - 0.5, right - 0.5, bottom - 0.5, top - 0.5)

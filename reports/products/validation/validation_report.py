@@ -78,7 +78,6 @@ def report(args: argparse.Namespace) -> None:
 
 
 def _of_samples(made: xr.Dataset, asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Tells the fit of a population, and its prediction."""
     count = made.sizes["sample"]
     quantile = student.ppf(0.975, count - 1) * np.sqrt(1 + 1 / count)
     return {

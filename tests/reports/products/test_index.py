@@ -62,8 +62,8 @@ def test_figures_come_first_and_drafts_are_marked(results: Path, html: str) -> N
 def test_claims_are_judged_where_the_study_is_built(html: str) -> None:
     assert "Figure 2: <a" in html
     assert "<code>make fig7</code> builds it" in html
-    tables = {table.name: table for table in index_report.tables(())}
-    assert all(each.simulation.why == "study not built" for each in tables["fig2"].claims)
+    tables = {table["name"]: table for table in index_report.tables(())}
+    assert all(each.simulation.why == "study not built" for each in tables["fig2"]["claims"])
 
 
 def test_datasets_carry_their_hash(results: Path, html: str) -> None:
