@@ -1,7 +1,7 @@
 """Composes the report along a path: panels with tables, text of the page, animation."""
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -91,14 +91,19 @@ def design_panels(
     ]
 
 
+def _size(drive: Any) -> str:  # noqa: ANN401  (any drive that has an amplitude)
+    """Tells the amplitude of a drive with its unit, angles in degrees."""
+    if drive.unit == "rad":
+        return f"{np.degrees(drive.amplitude):.4g}°"
+    return f"{drive.amplitude:.4g} {drive.unit}"
+
+
 def _at_rest(figure: Figure, study: StudyResults) -> Iterator[Axes]:
     """Yields the structures side by side, and how large and how driven they are."""
     side, names = 40.0, structures(study.response)
     lattice, drives = study.problem.lattice, single_drives(study.problem.drive)
     size = f"{lattice_size(lattice)} units, $s$ = {lattice.spacing:g} mm"
-    sizes = [
-        f"{drive.amplitude:.4g} {drive.unit}" for drive in drives if hasattr(drive, "amplitude")
-    ]
+    sizes = [_size(drive) for drive in drives if hasattr(drive, "amplitude")]
     notes = [size, f"$A$ = {', '.join(sizes)}" if sizes else "", ""]
     left = (3 - len(names)) * (side + 0.6) / 2
     for k, name in enumerate(names):

@@ -79,7 +79,8 @@ def rest_panel(axes: Axes, problem: Problem, response: xr.Dataset, name: str) ->
         _draw_outlines(axes, problem.void.outlines(problem.lattice.centre_site))
     for drive in single_drives(problem.drive):
         units = list(selected_units(drive.units, problem.lattice))
-        _load_arrows(axes, structure, drive, structure.centroid[units])
+        moved = response["displacement"].sel(structure=name).isel(case=0, unit=units).mean("unit")
+        _load_arrows(axes, structure, drive, structure.centroid[units], moved)
 
 
 def _draw_outlines(axes: Axes, outlines: tuple[Outline, ...]) -> None:
@@ -89,8 +90,13 @@ def _draw_outlines(axes: Axes, outlines: tuple[Outline, ...]) -> None:
         axes.plot(*ring.T, color=style.ALTERED, lw=0.7, zorder=6)
 
 
-def _load_arrows(axes: Axes, structure: RigidUnits, drive: SingleDrive, ends: Floats) -> None:
-    """Draws arrows onto some of the driven units, along the drive or in its sense of turning."""
+def _load_arrows(
+    axes: Axes, structure: RigidUnits, drive: SingleDrive, ends: Floats, moved: xr.DataArray
+) -> None:
+    """Draws arrows onto some of the driven units, along the drive or in its sense of turning.
+
+    A measured motion has them along its largest displacement.
+    """
     few = np.unique(np.linspace(0, len(ends) - 1, 5).round().astype(int))
     size = float(np.ptp(structure.centroid[structure.present], axis=0).max())
     reach = max(0.055 * size, 0.8 * size / np.sqrt(structure.present.sum()))
@@ -101,7 +107,9 @@ def _load_arrows(axes: Axes, structure: RigidUnits, drive: SingleDrive, ends: Fl
             axes.text(end[0], end[1], turn, color=style.ALTERED, ha="center", va="center", zorder=7)
         return
     if (angles := getattr(drive, "directions", None)) is None:  # a measured course
-        return
+        way = moved.sel(dof=["ux", "uy"]).transpose("time", "dof").values
+        x, y = way[np.hypot(*way.T).argmax()]
+        angles = (np.arctan2(y, x),) if np.hypot(x, y) > 0.0 else ()
     for angle in angles:
         along = np.array([np.cos(angle), np.sin(angle)])
         for end in shown:

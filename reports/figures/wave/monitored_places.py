@@ -7,7 +7,7 @@ import xarray as xr
 
 from pipeline.problem import Problem
 from reports.figures.loading_path import interest, scales, squares
-from reports.study import RigidUnits, from_dataset, unit_at
+from reports.study import RigidUnits, from_dataset, middle_of_top_edge, unit_at
 
 Mark = str | tuple[int, int, int]
 
@@ -25,11 +25,11 @@ class MonitoredUnit:
 
 
 def places(problem: Problem, response: xr.Dataset) -> list[MonitoredUnit]:
-    """Returns the places that the problem names."""
+    """Returns the places that the problem names; the middle of the top edge where it names none."""
     structure = first_structure(problem, response)
+    units = [unit_at(structure, np.array(point)) for point in problem.report.places]
     found = []
-    for mark, point in zip(MARKS, problem.report.places, strict=False):
-        unit = unit_at(structure, np.array(point))
+    for mark, unit in zip(MARKS, units or [middle_of_top_edge(structure)], strict=False):
         i, j = (int(response[name][unit]) for name in ("i", "j"))
         found.append(MonitoredUnit(unit, mark, f"unit ({i}, {j})"))
     return found

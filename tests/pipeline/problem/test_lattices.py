@@ -8,11 +8,19 @@ import pytest
 import xarray as xr
 from ezdxf.enums import InsertUnits
 from ezdxf.filemanagement import new
+from pydantic import TypeAdapter
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.posing import scene_of
-from pipeline.problem import canonical_json, cloak_units, from_canonical, interest_units, void_units
+from pipeline.problem import (
+    canonical_json,
+    cloak_units,
+    from_canonical,
+    interest_units,
+    sections,
+    void_units,
+)
 from pipeline.problem.outlines.network_files import COLUMNS
 from pipeline.problem.reading import load
 from pipeline.problem.sections import selected_units
@@ -244,3 +252,12 @@ def test_ligaments_of_a_list_may_have_stiffnesses_of_their_own(tmp_path: Path) -
     kept = np.isin(ends, scene.lattice.id).all(axis=1)
     assert 0 < kept.sum() < len(own)
     np.testing.assert_array_equal(scene.structure.material.bending_stiffness, own[kept])
+
+
+def test_hexagonal_is_another_name_of_the_honeycomb() -> None:
+    sizes = {"columns": 3, "rows": 4, "spacing": "15 mm", "ligament_length": "2.25 mm"}
+    reader: TypeAdapter[object] = TypeAdapter(sections.Lattice)
+    one, other = (
+        reader.validate_python({"kind": kind, **sizes}) for kind in ("honeycomb", "hexagonal")
+    )
+    assert one == other

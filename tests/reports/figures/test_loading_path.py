@@ -1,19 +1,23 @@
 import dataclasses
 import json
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrowPatch
 
 from pipeline.comparison import middle_units
-from pipeline.problem.sections import Paper
+from pipeline.posing import law_comparison
+from pipeline.problem.sections import Paper, RotationDrive, TimeSeriesDrive
 from pipeline.runtime import UserError
 from reports.base import style
 from reports.facts import checks, fact_records
 from reports.figures import kinds
 from reports.figures.loading_path import abscissa, figure, measures, monte_carlo
 from reports.figures.loading_path import facts as path_facts
+from reports.figures.loading_path.structure_panels import rest_panel
 from reports.figures.shielding import facts as shielding
 from reports.figures.study_report import as_built_facts, study_report
 from reports.page import publish
@@ -294,3 +298,38 @@ def test_the_page_is_whole(shield: StudyResults, tmp_path: Path) -> None:
     assert "as run" in html
     assert "vertices off by up to ±3 % of s (5 copies)" in html
     assert len(html.encode()) < 6_000_000
+
+
+def test_a_measured_motion_has_arrows_along_its_largest_displacement(smile: StudyResults) -> None:
+    drive = TimeSeriesDrive.model_validate(
+        {"kind": "time_series", "units": "right", "file": "shaker.csv"}
+    )
+    asked = smile.problem.model_copy(update={"drive": drive})
+    axes = Figure().add_subplot()
+    rest_panel(axes, asked, smile.response, "altered")
+    arrows = [each for each in axes.patches if isinstance(each, FancyArrowPatch)]
+    assert len(arrows) == 3
+    for each in arrows:
+        (x, y), (end, same) = vars(each)["_posA_posB"]
+        assert x > end
+        assert y == pytest.approx(same)
+
+
+def test_amplitudes_of_rotations_are_told_in_degrees(smile: StudyResults) -> None:
+    turn = RotationDrive.model_validate(
+        {"kind": "rotation", "units": "right", "amplitude": "1 deg"}
+    )
+    asked = smile.problem.model_copy(update={"drive": turn})
+    drawn = Figure()
+    list(figure._at_rest(drawn, dataclasses.replace(smile, problem=asked)))
+    words = [text.get_text() for axes in drawn.axes for text in axes.texts]
+    assert "$A$ = 1°" in [*words, *(text.get_text() for text in drawn.texts)]
+
+
+@pytest.mark.parametrize("law", ["angle", "geometric"])
+def test_evaluations_by_the_angle_law_are_told_where_they_come_first(
+    smile: StudyResults, law: Literal["angle", "geometric"]
+) -> None:
+    asked = smile.problem.with_optimiser(angle=smile.problem.optimiser.methods.sqp)
+    found = checks.history_facts(law_comparison.under(asked, law), smile.design)
+    assert ("evaluations_angle" in {fact.key for fact in found}) == (law == "geometric")

@@ -6,7 +6,7 @@ from pipeline.runtime import ROOT
 from reports.figures import kinds
 from reports.figures.loading_path import measures
 from reports.figures.wave import closed_voids, facts
-from reports.figures.wave.monitored_places import relative_error
+from reports.figures.wave.monitored_places import places, relative_error
 from reports.study import StudyResults, from_dataset
 
 CUTOFF = np.deg2rad(-10.0)
@@ -44,6 +44,11 @@ def test_voids_close_by_the_turn_of_one_unit_against_the_other(smile: StudyResul
 def test_edges_are_the_ligaments_of_the_outer_rows(smile: StudyResults) -> None:
     part = smile.response.sel(structure="altered")
     assert closed_voids.on_edges(from_dataset(part, 15.0)).sum() == 2 * 14
+
+
+def test_a_study_without_places_shows_the_middle_of_the_top_edge(smile: StudyResults) -> None:
+    (place,) = places(smile.problem, smile.response)
+    assert place.name == "unit (7, 14)"
 
 
 def test_relative_error_by_hand(smile: StudyResults) -> None:

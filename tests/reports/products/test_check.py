@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from string import Template
 
 import pytest
 from PIL import Image, ImageDraw
 
 from pipeline.posing import cost_line, doubts, scene_of
 from pipeline.problem import load
+from pipeline.runtime import ROOT
 from reports.__main__ import main
 from sim.scene import estimate_cost, sample_times
 from tests.pipeline import static
@@ -76,6 +78,23 @@ def test_a_far_push_is_doubted(tmp_path: Path) -> None:
     path = static.write(tmp_path, static.HOLE, size=5, amplitude=40.0)
     (told,) = doubted(path)
     assert told.startswith("the drive goes 40 mm, 5")
+
+
+@pytest.mark.parametrize(("angle", "amplitude"), [("180", "1"), ("180", "0.05"), ("0", "1")])
+def test_a_push_on_rows_of_hexagons_is_doubted(tmp_path: Path, angle: str, amplitude: str) -> None:
+    """They buckle at 0.19 mm: 8 x 8 of them."""
+    text = (ROOT / "pipeline/workflow/templates/static.yaml").read_text()
+    disc = "  disc: { centre: centre, radius: 18 mm }"
+    text = Template(text).substitute(name="x", build="", title="x", void=disc, quick=f"    {disc}")
+    text = text.replace("kind: quads", "kind: triangular").replace("  bias_angle:", "  #")
+    text = text.replace("[180 deg]", f"[{angle} deg]").replace(
+        "amplitude: 4 mm", f"amplitude: {amplitude} mm"
+    )
+    (tmp_path / "problem.yaml").write_text(text)
+    asked = load(tmp_path / "problem.yaml", "quick")
+    told = list(doubts(asked, scene_of(asked, tmp_path)))
+    assert len(told) == ((angle, amplitude) == ("180", "1"))
+    assert all(line.startswith("rows of hexagons buckle") for line in told)
 
 
 def test_a_neck_is_doubted(tmp_path: Path) -> None:
