@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from pipeline.problem import Problem
-from pipeline.problem.sections import SingleDrive, Triangular, single_drives
+from pipeline.problem.sections import SingleDrive, Triangular, case_count, single_drives
 from sim.core import Ints
 from sim.scene import Scene, estimate_cost, sample_times
 from sim.structure import Lattice
@@ -23,6 +23,8 @@ START = 20.0
 STEP = 2e-5
 """Seconds of a step of SQP besides, over the square of the units to redesign: within a factor of
 two and a half in the eight studies of a static path."""
+AFTER = 24
+"""Evaluations of a motion in time that its steps, its response and their checks cost (fig7)."""
 
 
 def cost_line(asked: Problem, scene: Scene) -> str:
@@ -34,7 +36,7 @@ def cost_line(asked: Problem, scene: Scene) -> str:
         first = optimiser.angle.evaluations if optimiser.angle else 0
         budget["sqp"] = optimiser.descents * (first + budget["sqp"])
     evaluations = sum(budget.values())
-    seconds = START + evaluations * cost.seconds
+    seconds = START + (evaluations + (0 if scene.loads.static else AFTER)) * cost.seconds
     seconds += STEP * len(scene.design.cloak) ** 2 * budget.get("sqp", 0)
     longest = f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
     return (
@@ -42,7 +44,16 @@ def cost_line(asked: Problem, scene: Scene) -> str:
         f" {cost.unknowns} unknowns; {len(scene.loads.cases)} load case(s);"
         f" about {max(0.3, cost.memory / 1e9):.2g} GB;"
         f" {evaluations} evaluations of the design, about {longest} on one core"
+        f"{''.join(_followed_by(asked))}"
     )
+
+
+def _followed_by(asked: Problem) -> Iterator[str]:
+    """Yields what is simulated besides, and takes a time of its own."""
+    if asked.sweep is not None:
+        yield f"; then {case_count(asked.sweep)} cases of the sweep"
+    if asked.robustness is not None:
+        yield f"; then {asked.robustness.samples} imperfect copies"
 
 
 def doubts(asked: Problem, scene: Scene) -> Iterator[str]:

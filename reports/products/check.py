@@ -25,7 +25,8 @@ from pipeline.problem import Problem
 from reports.base import style
 from reports.figures.loading_path import DRIVE_TINT, INTEREST_TINT, UNIT_TINT, rest_panel
 from reports.panels import CLAMP_TINT, CLOAK_TINT
-from sim.scene import Scene
+from sim.scene import DOFS, Scene
+from sim.solvers import TimeSeries
 
 SIDE = 110.0
 """Of the picture, mm."""
@@ -60,7 +61,16 @@ def _at_rest(asked: Problem, scene: Scene) -> xr.Dataset:
         **network_variables(asked, scene),
         "vertices": (("structure", "unit", "vertex", "xy"), places[None]),
     }
-    coordinates = {**unit_coordinates(intact), "structure": (("structure",), ["cloaked"])}
+    motion = scene.loads.motions[0]
+    if isinstance(motion, TimeSeries):
+        course = np.asarray(motion.motion)[None, None, :, None]
+        whole = np.broadcast_to(course, (1, 1, len(motion.times), intact.n_units, 3))
+        variables["displacement"] = (("structure", "case", "time", "unit", "dof"), whole)
+    coordinates = {
+        **unit_coordinates(intact),
+        "structure": (("structure",), ["cloaked"]),
+        "dof": ("dof", list(DOFS)),
+    }
     return xr.Dataset(variables, coordinates)
 
 

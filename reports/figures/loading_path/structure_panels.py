@@ -1,5 +1,6 @@
 """Describes panels that show structures: at rest with their regions, and along the path."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from pipeline.problem.sections import (
     Region,
     RotationDrive,
     SingleDrive,
+    TimeSeriesDrive,
     TorqueDrive,
     single_drives,
 )
@@ -79,8 +81,7 @@ def rest_panel(axes: Axes, problem: Problem, response: xr.Dataset, name: str) ->
         _draw_outlines(axes, problem.void.outlines(problem.lattice.centre_site))
     for drive in single_drives(problem.drive):
         units = list(selected_units(drive.units, problem.lattice))
-        moved = response["displacement"].sel(structure=name).isel(case=0, unit=units).mean("unit")
-        _load_arrows(axes, structure, drive, structure.centroid[units], moved)
+        _load_arrows(axes, structure, _ways(drive, response, units), structure.centroid[units])
 
 
 def _draw_outlines(axes: Axes, outlines: tuple[Outline, ...]) -> None:
@@ -90,27 +91,34 @@ def _draw_outlines(axes: Axes, outlines: tuple[Outline, ...]) -> None:
         axes.plot(*ring.T, color=style.ALTERED, lw=0.7, zorder=6)
 
 
-def _load_arrows(
-    axes: Axes, structure: RigidUnits, drive: SingleDrive, ends: Floats, moved: xr.DataArray
-) -> None:
-    """Draws arrows onto some of the driven units, along the drive or in its sense of turning.
+def _ways(drive: SingleDrive, response: xr.Dataset, units: list[int]) -> Sequence[float] | str:
+    """Returns directions of a drive, rad, or a sign of its sense of turning.
 
-    A measured motion has them along its largest displacement.
+    A measured motion goes along its largest displacement.
     """
+    if isinstance(drive, TorqueDrive | RotationDrive):
+        return "\u21ba" if drive.amplitude > 0 else "\u21bb"
+    if not isinstance(drive, TimeSeriesDrive):
+        return drive.directions
+    moved = response["displacement"].isel(structure=0, case=0, unit=units[0])
+    way = moved.sel(dof=["ux", "uy"]).transpose("time", "dof").values
+    x, y = way[np.hypot(*way.T).argmax()]
+    return (np.arctan2(y, x),) if np.hypot(x, y) > 0.0 else ()
+
+
+def _load_arrows(
+    axes: Axes, structure: RigidUnits, ways: Sequence[float] | str, ends: Floats
+) -> None:
+    """Draws arrows onto some of the driven units, along ways (rad), or a sign in the units."""
     few = np.unique(np.linspace(0, len(ends) - 1, 5).round().astype(int))
     size = float(np.ptp(structure.centroid[structure.present], axis=0).max())
     reach = max(0.055 * size, 0.8 * size / np.sqrt(structure.present.sum()))
     shown = ends[few[1:-1] if len(few) == 5 else few]
-    if isinstance(drive, TorqueDrive | RotationDrive):
+    if isinstance(ways, str):
         for end in shown:
-            turn = "\u21ba" if drive.amplitude > 0 else "\u21bb"
-            axes.text(end[0], end[1], turn, color=style.ALTERED, ha="center", va="center", zorder=7)
+            axes.text(end[0], end[1], ways, color=style.ALTERED, ha="center", va="center", zorder=7)
         return
-    if (angles := getattr(drive, "directions", None)) is None:  # a measured course
-        way = moved.sel(dof=["ux", "uy"]).transpose("time", "dof").values
-        x, y = way[np.hypot(*way.T).argmax()]
-        angles = (np.arctan2(y, x),) if np.hypot(x, y) > 0.0 else ()
-    for angle in angles:
+    for angle in ways:
         along = np.array([np.cos(angle), np.sin(angle)])
         for end in shown:
             start, tip = end - 1.3 * reach * along, end - 0.3 * reach * along
