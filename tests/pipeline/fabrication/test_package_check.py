@@ -15,7 +15,7 @@ from pipeline.fabrication.checks import check_package, laser_folder, package_rec
 from pipeline.fabrication.checks.assembled_specimen import unit_sections
 from pipeline.fabrication.checks.bill_checks import check_bill
 from pipeline.fabrication.checks.package_record import PackageRecord, expected_parts
-from pipeline.fabrication.papers import MANIFEST
+from pipeline.fabrication.papers import BILL, MANIFEST, read_bill
 from pipeline.fabrication.readback import Drawing, read_drawing, read_stl
 from pipeline.problem import Problem
 from pipeline.problem.fields import SIM_UNITS
@@ -227,3 +227,10 @@ def test_the_same_design_gives_the_same_bytes(whole: tuple[Path, Problem], tmp_p
     assert first == second
     suffixes = {Path(name).suffix for name in first}
     assert suffixes == {".dxf", ".svg", ".stl", ".3mf", ".pdf", ".csv", ".json"}
+
+
+def test_the_bill_says_which_files_hold_each_unit_and_shim(whole: tuple[Path, Problem]) -> None:
+    rows = [row for row in read_bill(whole[0] / BILL) if row["item"] in ("unit", "shim")]
+    files = [row["files"].split() for row in rows]
+    assert all(files)
+    assert all((whole[0] / name).is_file() for names in files for name in names)

@@ -4,8 +4,9 @@ from contextlib import suppress
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import TypeAdapter, ValidationError
 
-from pipeline.problem.fields import units
+from pipeline.problem.fields import quantities, units
 from pipeline.problem.fields.units import Dimension, parse_quantity
 from pipeline.runtime import UserError
 
@@ -93,3 +94,30 @@ def test_examples_are_valid(dimension: Dimension) -> None:
 def test_any_text_is_read_or_refused(text: str) -> None:
     with suppress(UserError):
         assert math.isfinite(parse_quantity(text, units.LENGTH))
+
+
+@pytest.mark.parametrize(
+    ("name", "zero", "vanishes"),
+    [
+        ("Length", "0 mm", False),
+        ("Duration", "0 s", False),
+        ("Frequency", "0 Hz", False),
+        ("Density", "0 kg/m^2", False),
+        ("Force", "0 N", False),
+        ("Modulus", "0 MPa", False),
+        ("Stiffness", "0 N/mm", False),
+        ("BendingStiffness", "0 N mm/rad", False),
+        ("ContactStiffness", "0 N mm/rad^2", False),
+        ("Gap", "0 mm", True),
+        ("Delay", "0 s", True),
+        ("Damping", "0 kg/s", True),
+        ("RotaryDamping", "0 kg m^2/s", True),
+    ],
+)
+def test_quantities_that_may_be_zero(name: str, zero: str, vanishes: bool) -> None:
+    reader: TypeAdapter[float] = TypeAdapter(getattr(quantities, name))
+    if vanishes:
+        assert reader.validate_python(zero) == 0.0
+        return
+    with pytest.raises(ValidationError, match="must be greater than zero"):
+        reader.validate_python(zero)
