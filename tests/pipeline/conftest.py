@@ -6,7 +6,7 @@ import pytest
 from pipeline.__main__ import run_stage
 from pipeline.problem.reading import load
 from pipeline.runtime import UserError
-from tests.pipeline.static import HOLE, write
+from tests.pipeline.static import HOLE, designed, write
 
 FIG2 = Path(__file__).parents[2] / "experiments/fig2/problem.yaml"
 
@@ -20,12 +20,9 @@ def fig2() -> Path:
 @pytest.fixture(scope="session")
 def hole(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     """Options that name a small problem with a void; its design is beside it."""
-    folder = tmp_path_factory.mktemp("hole")
-    options = ["--problem", str(write(folder, HOLE, size=5, amplitude=3.0)), "--quiet", "--out"]
-    made = str(folder / "design_sqp.nc")
-    assert run_stage("design", [*options, made, "--method", "sqp"]) == 0
-    assert run_stage("select", [*options, str(folder / "design.nc"), "--designs", made]) == 0
-    return options
+    path = write(tmp_path_factory.mktemp("hole"), HOLE, size=5, amplitude=3.0)
+    designed(path)
+    return ["--problem", str(path), "--quiet", "--out"]
 
 
 Refusal = Callable[..., UserError]
@@ -49,3 +46,24 @@ def refusal(tmp_path: Path) -> Refusal:
         return error
 
     return refused
+
+
+Failing = Callable[..., str]
+
+
+@pytest.fixture
+def failing(capfd: pytest.CaptureFixture[str]) -> Failing:
+    """Runs a stage that ends with one message and writes nothing; returns the message."""
+
+    def told(stage: str, words: list[str]) -> str:
+        out = Path(words[words.index("--out") + 1]) if "--out" in words else None
+        before = out.read_bytes() if out and out.exists() else None
+        assert run_stage(stage, words) == 2
+        error = capfd.readouterr().err
+        assert error.count("error: ") == 1
+        assert "remedy:" in error
+        assert "Traceback" not in error
+        assert out is None or (out.read_bytes() if out.exists() else None) == before
+        return error
+
+    return told

@@ -1,74 +1,14 @@
 """Random datasets that obey their tables."""
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
 from pipeline.datasets.tables import SCHEMAS, TABLES, Kind, Variable
+from tests.tables import tables
 
-SIZES = {
-    "unit": 49,
-    "vertex": 4,
-    "xy": 2,
-    "ligament": 84,
-    "end": 2,
-    "method": 2,
-    "evaluation": 5,
-    "case": 4,
-    "variable": 80,
-    "constraint": 5,
-    "structure": 3,
-    "time": 11,
-    "contact_law": 2,
-    "dof": 3,
-    "parameter": 2,
-    "noise": 2,
-    "sample": 4,
-    "check": 3,
-    "row": 3,
-    "column": 3,
-    "power": 2,
-    "xyz": 3,
-    "side": 2,
-    "source": 3,
-    "estimate": 3,
-    "with_parameter": 4,
-    "set": 3,
-    "point": 20,
-    "run": 3,
-    "quantity": 3,
-    "work": 2,
-    "optimiser": 2,
-    "video": 2,
-    "tracker": 2,
-    "thinning": 3,
-    "state": 2,
-    "mode": 4,
-    "excitation": 5,
-    "compression": 2,
-    "wave": 7,
-    "constant": 3,
-    "with_constant": 3,
-    "test": 3,
-    "quantile": 5,
-    "factor": 7,
-    "step": 6,
-    "predicted": 6,
-    "simulated_set": 4,
-    "left_out": 3,
-    "mechanism": 4,
-    "record": 2,
-    "part": 3,
-    "frame": 4,
-    "snap": 3,
-    "snap_number": 2,
-    "traced_point": 9,
-    "loop": 2,
-    "band": 12,
-    "preset": 3,
-    "design": 2,
-    "load": 5,
-    "search": 3,
-}
+SIZES: dict[str, int] = tables("samples")["sizes"]
 
 
 _ATTRIBUTES: dict[str, dict[str, str]] = {
@@ -121,3 +61,20 @@ def _values(name: str, variable: Variable, random: np.random.Generator) -> np.nd
     if variable.dtype == "float64":
         return random.normal(size=shape)
     return random.integers(2, size=shape)
+
+
+def filled(
+    kind: Kind, sizes: dict[str, int], value: float = 0.0, whole: int = 0, **others: float
+) -> dict[str, Any]:
+    """Every variable of a kind on dimensions of known sizes, constant."""
+    return {
+        name: (
+            variable.dims,
+            np.full(
+                [sizes[dim] for dim in variable.dims],
+                others.get(name, whole if variable.dtype.startswith("int") else value),
+            ),
+        )
+        for name, variable in TABLES[kind].items()
+        if not variable.coordinate and set(variable.dims) <= set(sizes)
+    }

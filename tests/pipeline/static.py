@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from pipeline.__main__ import run_stage
+
 GEOMETRIC = 3
 """Evaluations of a second optimisation, with contact on distance."""
 
@@ -56,6 +58,15 @@ SHIELD = (
     "objective: { kind: strain_energy, target: rest, region: { disc: { radius: 67.5 mm } } }\n"
 )
 HOLE = "void: { disc: { radius: 7 mm } }\ncloak: { disc: { radius: 22 mm } }\n" + MIMIC
+
+
+def designed(problem: Path, *more: str) -> Path:
+    """Designs by SQP and selects, beside the problem; returns the file of the design."""
+    words = ["--problem", str(problem), *more, "--quiet", "--out"]
+    made, chosen = (problem.with_name(f"{name}.nc") for name in ("design_sqp", "design"))
+    assert run_stage("design", [*words, str(made), "--method", "sqp"]) == 0
+    assert run_stage("select", [*words, str(chosen), "--designs", str(made)]) == 0
+    return chosen
 
 
 def write(folder: Path, more: str, size: int = 15, amplitude: float = 15.0) -> Path:

@@ -1,7 +1,9 @@
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from reports.__main__ import main
 from reports.figures.study_report import study_report
 from reports.page import publish
 from reports.study import StudyResults
@@ -42,3 +44,21 @@ def shield(tmp_path_factory: pytest.TempPathFactory) -> StudyResults:
 def smile(tmp_path_factory: pytest.TempPathFactory) -> StudyResults:
     """A void to be hidden."""
     return compressed_study.written(tmp_path_factory.mktemp("smile"), compressed_study.SMILE)
+
+
+Failing = Callable[..., str]
+
+
+@pytest.fixture
+def failing(capfd: pytest.CaptureFixture[str]) -> Failing:
+    """Makes a page that cannot be made, of which nothing is left; returns what is told."""
+
+    def told(kind: str, out: Path, *words: object) -> str:
+        option = "--out" if out.suffix else "--out-dir"
+        assert main([kind, *map(str, words), option, str(out)]) == 2
+        error = capfd.readouterr().err
+        assert "Traceback" not in error
+        assert not out.exists()
+        return error
+
+    return told
