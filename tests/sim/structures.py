@@ -3,40 +3,67 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+import sim
 from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
 from sim.core import Floats, Ints
 from sim.energy import Topology, topology
 from sim.energy.network_arrays import NetworkArrays
 from sim.linalg import Matrix
-from sim.solvers import (
-    DISPLACEMENT,
-    MotionLaw,
-    PrescribedMotion,
-    Solver,
-    differentiable_motion,
-    held_dofs,
-)
+from sim.solvers import DISPLACEMENT, Solver, differentiable_motion, held_dofs
 from sim.structure import (
+    ConcreteParameters,
     DesignSpace,
-    DistanceContact,
-    Lattice,
-    Material,
     Parameters,
-    VoidAngleContact,
     design_space,
     parameters,
-    quads,
     shape,
 )
 
 NONE = np.array([], dtype=np.int64)
+RING = np.array([6, 7, 8, 11, 13, 16, 17, 18])
+"""The units around the middle of 5 x 5."""
+LEFT = 5 * np.arange(5)
+
+
+def pressed(depth: float, **changes: Any) -> sim.Scene:  # noqa: ANN401  (fields of a scene)
+    """5 x 5 squares, the left column clamped, the right one pushed in; the middle is to rest."""
+    drive = sim.PrescribedMotion(LEFT + 4, sim.LinearRamp(-depth, 1.0))
+    made = sim.Scene(
+        sim.Structure(rotating_squares(), MATERIAL),
+        sim.Loads((drive,), (sim.Clamp(LEFT),), static=True),
+        sim.Objective(region=np.array([12]), steps=2),
+        sim.Design(cloak=RING),
+    )
+    return made.updated(**changes)
+
+
+def taylor_orders(value: Callable[[float], Any], slope: float | Floats, steps: Floats) -> Floats:
+    """Powers with which the remainder of a value's linear model falls from step to step: 2."""
+    left = np.log([np.abs(value(step) - value(0.0) - step * slope) for step in steps])
+    return (np.diff(left, axis=0).T / np.diff(np.log(steps))).T
+
+
+def central(value: Callable[[float], Any], step: float) -> Any:  # noqa: ANN401  (as the value)
+    """Slope of a value at zero by central differences."""
+    return (np.asarray(value(step)) - np.asarray(value(-step))) / (2 * step)
+
+
+def at_rest(lattice: sim.Lattice) -> ConcreteParameters:
+    """Parameters of a lattice as it is."""
+    made = parameters(lattice, shape(lattice, lattice.vertices), MATERIAL)
+    return ConcreteParameters(*map(np.asarray, made))
+
+
+def assert_equal(found: Floats, wanted: Array | Floats) -> None:
+    """Asserts equality but for 1e-12 of the largest entry."""
+    assert np.abs(found - wanted).max() <= 1e-12 * np.abs(wanted).max()
 
 
 def some_ligaments(net: NetworkArrays, which: Ints) -> NetworkArrays:
@@ -72,11 +99,11 @@ def _entries_of_fronts(of: Matrix) -> tuple[Ints, Ints, Floats]:
     return rows[lower], columns[lower], entries[lower]
 
 
-def rotating_squares(side: int = 5, bias_deg: float = 20.0) -> Lattice:
-    return quads(side, side, 15.0, 2.25, np.deg2rad(bias_deg))
+def rotating_squares(side: int = 5, bias_deg: float = 20.0) -> sim.Lattice:
+    return sim.quads(side, side, 15.0, 2.25, np.deg2rad(bias_deg))
 
 
-def mixed_polygons() -> Lattice:
+def mixed_polygons() -> sim.Lattice:
     """A hexagon with a triangle at each corner, chained to a ring, and a pentagon at one end."""
     ring = np.deg2rad(60.0) * np.arange(6)
     outward = np.stack([np.cos(ring), np.sin(ring)], axis=1)
@@ -95,13 +122,13 @@ def mixed_polygons() -> Lattice:
     return hand_made(polygons, np.array([*spokes, *chain, (corner[1] + 1, corner[7])]))
 
 
-def hand_made(polygons: list[Floats], ligaments: Ints) -> Lattice:
+def hand_made(polygons: list[Floats], ligaments: Ints) -> sim.Lattice:
     """Lattice of any polygons; ``ligaments`` (n, 2) use each vertex at most once."""
     n_vertices = sum(len(polygon) for polygon in polygons)
     group = np.arange(n_vertices)
     group[ligaments[:, 1]] = group[ligaments[:, 0]]
     n_units = len(polygons)
-    return Lattice(
+    return sim.Lattice(
         vertices=np.concatenate(polygons),
         unit=np.repeat(np.arange(n_units), [len(polygon) for polygon in polygons]),
         ligaments=ligaments,
@@ -130,7 +157,7 @@ class Numbers(NamedTuple):
     contact: Array
     density: Array
     damping: Array
-    drive: MotionLaw
+    drive: sim.MotionLaw
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,10 +172,10 @@ class Rig:
         control: (n_driven, 3) which dofs of the driven units are displaced, loaded or free.
     """
 
-    lattice: Lattice
+    lattice: sim.Lattice
     clamped: Ints
     driven: Ints
-    motion: MotionLaw
+    motion: sim.MotionLaw
     distance: float | None = None
     control: Ints | None = None
 
@@ -158,8 +185,8 @@ class Rig:
 
     @cached_property
     def topology(self) -> Topology:
-        angles = VoidAngleContact(BARRIER, CUTOFF)
-        contact = angles if self.distance is None else DistanceContact(self.distance)
+        angles = sim.VoidAngleContact(BARRIER, CUTOFF)
+        contact = angles if self.distance is None else sim.DistanceContact(self.distance)
         held = held_dofs(self.clamped, self.driven)
         if self.control is not None:
             dofs = 3 * self.driven[:, None] + np.arange(3)
@@ -186,7 +213,7 @@ class Rig:
         def of_numbers(numbers: Numbers) -> Parameters:
             axial, shear, bending = numbers.stiffness.T
             one = numbers.density * MATERIAL.density
-            material = Material(
+            material = sim.Material(
                 one,
                 MATERIAL.axial_stiffness * axial,
                 MATERIAL.shear_stiffness * shear,
@@ -206,11 +233,11 @@ class Rig:
         return Parameters(*(np.asarray(part) for part in self.parameters(self.numbers)))
 
     @property
-    def drive(self) -> PrescribedMotion:
+    def drive(self) -> sim.PrescribedMotion:
         return self.driven_by(self.motion)
 
-    def driven_by(self, motion: MotionLaw) -> PrescribedMotion:
-        return PrescribedMotion(self.driven, motion, self.control)
+    def driven_by(self, motion: sim.MotionLaw) -> sim.PrescribedMotion:
+        return sim.PrescribedMotion(self.driven, motion, self.control)
 
     def loss(self, solver: Solver, numbers: Numbers) -> Array:
         """A smooth function of displacement and velocity without any symmetry."""

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -58,14 +59,17 @@ print(time.monotonic() - began, working_time() - worked)
 """
 
 
+def twice(folder: Path, script: str) -> tuple[list[str], list[str]]:
+    """What a script prints that finds no compiled loop, and what it prints once it does."""
+    (folder / "loops.py").write_text(LOOPS)
+    places = {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder}", "NUMBA_CACHE_DIR": str(folder)}
+    command = [sys.executable, "-c", script]
+    run = partial(subprocess.check_output, env=os.environ | places, text=True, timeout=120)
+    return run(command).splitlines(), run(command).splitlines()
+
+
 def test_compiling_is_told_once_and_does_not_count_as_work(tmp_path: Path) -> None:
-    (tmp_path / "loops.py").write_text(LOOPS)
-    places = {"PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}", "NUMBA_CACHE_DIR": str(tmp_path)}
-    count = [sys.executable, "-c", COUNT]
-    first, second = (
-        subprocess.check_output(count, env=os.environ | places, text=True, timeout=120).splitlines()
-        for _ in range(2)
-    )
+    first, second = twice(tmp_path, COUNT)
     assert first[:-1] == ["compiling loops, once on this machine: up to a minute or two"]
     passed, worked = map(float, first[-1].split())
     assert worked < 0.1 * passed
@@ -82,12 +86,6 @@ print(loops.inner(3), loops.inner.overloads[loops.inner.signatures[0]].library._
 
 
 def test_only_what_python_calls_has_machine_code(tmp_path: Path) -> None:
-    (tmp_path / "loops.py").write_text(LOOPS)
-    places = {"PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}", "NUMBA_CACHE_DIR": str(tmp_path)}
-    ask = [sys.executable, "-c", MACHINE_CODE]
-    first, second = (
-        subprocess.check_output(ask, env=os.environ | places, text=True, timeout=120).splitlines()
-        for _ in range(2)
-    )
+    first, second = twice(tmp_path, MACHINE_CODE)
     assert first == ["9.0 1", "False False", "3.0 True"]
     assert second == ["9.0 0", "None False", "3.0 True"]  # none of it is even read

@@ -4,8 +4,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from pipeline.runtime import ROOT
 from sim.core.instruction_set import can_pin
 
@@ -33,28 +31,14 @@ print("blas", *sorted({row["architecture"] for row in threadpool_info() if "arch
 """
 
 
-@pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+def test_libraries_and_loops_keep_to_the_level(tmp_path: Path) -> None:
     assert can_pin(), "this processor lacks AVX2: results differ in their last bits"
-    script = tmp_path_factory.mktemp("script") / "report.py"
-    script.write_text(REPORT)
+    (tmp_path / "report.py").write_text(REPORT)
     done = subprocess.run(
-        [sys.executable, script], cwd=ROOT, capture_output=True, text=True, check=True,
-        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin", "HOME": str(Path.home())},
+        [sys.executable, tmp_path / "report.py"], cwd=ROOT, capture_output=True, text=True,
+        check=True, env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin", "HOME": str(Path.home())},
     )  # fmt: skip
-    return dict(line.split(" ", 1) for line in done.stdout.splitlines())
-
-
-def test_loops_have_no_wider_vectors(report: dict[str, str]) -> None:
-    assert report["numba"] == "False"
-
-
-def test_numpy_takes_no_wider_loops(report: dict[str, str]) -> None:
-    assert report["numpy"] == "X86_V3"
-
-
-def test_blas_is_that_of_the_level(report: dict[str, str]) -> None:
-    assert report["blas"] == "Haswell"
+    assert done.stdout.splitlines() == ["numba False", "numpy X86_V3", "blas Haswell"]
 
 
 def test_xla_obeys(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from jax import Array
 
+import sim
 from benchmarks.scenes import MATERIAL
 from sim.collision import ContactArrays, collision_free_step
 from sim.collision.neighbour_list import find
@@ -30,20 +31,11 @@ from sim.energy import (
 )
 from sim.energy.distance_contact import barrier, edge_energy, vertices_energy
 from sim.linalg import clear, matrix, number_free_dofs
-from sim.structure import (
-    ConcreteParameters,
-    DistanceContact,
-    Lattice,
-    clearance,
-    displaced,
-    parameters,
-    shape,
-)
+from sim.structure import clearance, displaced
 from sim.structure.gaps import polygons
-from tests.sim.structures import dense, hand_made
+from tests.sim.structures import assert_equal, at_rest, dense, hand_made
 
 EXACT = 1e-12
-"""Relative to the largest entry."""
 REACH = 0.8
 LAW = DistanceLaw(float(MATERIAL.contact_stiffness) * (REACH / 2.0) ** 2, REACH)
 
@@ -58,7 +50,7 @@ def ring(rng: np.random.Generator, n: int, size: float) -> Floats:
 class Crowd(NamedTuple):
     """Units side by side, a small way apart, none of them joined but the first two."""
 
-    lattice: Lattice
+    lattice: sim.Lattice
     system: System
     motion: Floats
     direction: Floats
@@ -78,21 +70,16 @@ def crowd(seed: int) -> Crowd:
     motion[:, 2] = rng.normal(size=4)
     for unit in (1, 2, 3):
         motion[unit, :2] = -approach(lattice, motion, unit, sites[unit] / 15.0, rng)
-    system = system_of(_topology(lattice), _values(lattice))
+    system = system_of(_topology(lattice), at_rest(lattice))
     return Crowd(lattice, system, motion.ravel(), rng.normal(size=12))
 
 
-def _topology(lattice: Lattice) -> Topology:
-    return topology(lattice, np.array([], dtype=np.int64), DistanceContact(REACH))
-
-
-def _values(lattice: Lattice) -> ConcreteParameters:
-    made = shape(lattice, lattice.vertices)
-    return ConcreteParameters(*map(np.asarray, parameters(lattice, made, MATERIAL)))
+def _topology(lattice: sim.Lattice) -> Topology:
+    return topology(lattice, np.array([], dtype=np.int64), sim.DistanceContact(REACH))
 
 
 def approach(
-    lattice: Lattice, motion: Floats, unit: int, away: Floats, rng: np.random.Generator
+    lattice: sim.Lattice, motion: Floats, unit: int, away: Floats, rng: np.random.Generator
 ) -> Floats:
     """Where to push a unit so that a random small gap to the first one is left."""
     wanted, near, far = rng.uniform(0.2, 0.9) * REACH, 0.0, 30.0
@@ -157,10 +144,6 @@ def case(request: pytest.FixtureRequest) -> Crowd:
     return crowd(request.param)
 
 
-def assert_equal(found: Floats, wanted: Numbers) -> None:
-    assert np.abs(found - wanted).max() <= EXACT * np.abs(wanted).max()
-
-
 def test_energy_and_gradient(case: Crowd) -> None:
     out = np.zeros(12)
     energy = distance_contact_kernels.add_gradient(case.motion, case.contacts, out)
@@ -210,7 +193,7 @@ def test_units_in_contact_are_found_whatever_state_came_before(seed: int) -> Non
     state, found = case.motion, 0
     for step in (*np.full(20, 0.02), 3.0, *np.full(20, 0.05), 0.5, 0.5):
         state = state + step * rng.normal(size=12) * np.tile([1.0, 1.0, 0.2], 4)
-        fresh = system_of(_topology(case.lattice), _values(case.lattice)).contacts
+        fresh = system_of(_topology(case.lattice), at_rest(case.lattice)).contacts
         count, alone = find(state, case.contacts), find(state, fresh)
         assert count == alone
         np.testing.assert_array_equal(

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
+from benchmarks.scenes import BARRIER, CUTOFF
 from sim.core import Floats
 from sim.energy import (
     ContactLaw,
@@ -19,19 +19,17 @@ from sim.energy import (
 from sim.energy.network_arrays import Kinematics, NetworkArrays
 from sim.energy.observables import observe
 from sim.scene import concrete_parameters
-from sim.structure import ConcreteParameters, Lattice, VoidAngleContact, parameters, shape
+from sim.structure import Lattice, VoidAngleContact, shape
 from tests.sim.reference_scenes import compressed, reference
-from tests.sim.structures import mixed_polygons, rotating_squares, some_ligaments
+from tests.sim.structures import NONE, at_rest, mixed_polygons, rotating_squares, some_ligaments
 
 LAW = ContactLaw(1.5, BARRIER, CUTOFF)
 
 
 def network(lattice: Lattice) -> tuple[NetworkArrays, Floats]:
     """Kernel arrays of a lattice at rest, and its centroids."""
-    made = shape(lattice, lattice.vertices)
-    top = topology(lattice, np.array([], dtype=np.int64), VoidAngleContact(BARRIER, CUTOFF))
-    values = ConcreteParameters(*map(np.asarray, parameters(lattice, made, MATERIAL)))
-    return top.network(values), np.asarray(made.centroid)
+    top = topology(lattice, NONE, VoidAngleContact(BARRIER, CUTOFF))
+    return top.network(at_rest(lattice)), np.asarray(shape(lattice, lattice.vertices).centroid)
 
 
 SQUARES, MIXED = network(rotating_squares()), network(mixed_polygons())
@@ -141,16 +139,13 @@ def test_observables_are_those_of_each_state() -> None:
     """Energies of the kernels, reactions at held dofs alone, and one void below the cutoff."""
     lattice = rotating_squares()
     net, centroid = network(lattice)
-    law = VoidAngleContact(BARRIER, CUTOFF)
-    top = topology(lattice, np.arange(3), law)
-    made = shape(lattice, lattice.vertices)
-    values = ConcreteParameters(*map(np.asarray, parameters(lattice, made, MATERIAL)))
+    top = topology(lattice, np.arange(3), VoidAngleContact(BARRIER, CUTOFF))
     motion = np.zeros((3, *centroid.shape[:1], 3))
     motion[1, :, :2] = 1e-2 * centroid
     a, b = net.unit[0]
     turn = (CUTOFF - 1e-3 - net.void[0, 0]) / 2
     motion[2, a, 2], motion[2, b, 2] = turn, -turn
-    seen = observe(top, values, motion)
+    seen = observe(top, at_rest(lattice), motion)
     found = np.stack([seen.strain_energy, seen.contact_energy], axis=1)
     np.testing.assert_allclose(found, [energy(state.ravel(), net) for state in motion])
     assert found[1, 0] > 0.0 == found[1, 1]

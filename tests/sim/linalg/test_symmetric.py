@@ -68,11 +68,16 @@ def test_nan_is_not_positive_definite(by_fronts: bool, place: int) -> None:
     assert not factorise(made)
 
 
-def test_every_dof_is_numbered_once() -> None:
+@pytest.mark.parametrize("by_fronts", [False, True], ids=["band", "fronts"])
+def test_every_dof_is_numbered_once(by_fronts: bool) -> None:
     for site, pairs in networks().values():
-        free, pattern = number_free_dofs(site, pairs, HELD, by_fronts=True)
+        free, pattern = number_free_dofs(site, pairs, HELD, by_fronts)
         assert (free[HELD] == -1).all()
         np.testing.assert_array_equal(np.sort(free[free >= 0]), np.arange(pattern.n_dofs))
+        if not by_fronts:
+            places = np.where(free < 0, np.nan, free).reshape(-1, 3)[pairs].reshape(len(pairs), 6)
+            apart = np.nanmax(places, axis=1) - np.nanmin(places, axis=1)
+            assert apart.max() <= pattern.size[1]
 
 
 def test_fronts_are_chosen_where_they_are_faster() -> None:

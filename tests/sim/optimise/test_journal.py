@@ -1,4 +1,5 @@
 import logging
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,12 @@ from hypothesis import strategies as st
 
 from sim.core import SimulationError
 from sim.optimise import Journal, JournalInUseError, MmaOptions, SqpOptions, minimise
+from sim.optimise.minimisation import Method
 from tests.sim.optimise.known_problems import in_disc, rosenbrock
 
 Complete = tuple[bytes, tuple, int]
 OPTIONS = SqpOptions(evaluations=12, retreats=0)
+METHODS: dict[Method, SqpOptions | MmaOptions] = {"sqp": OPTIONS, "mma": MmaOptions(evaluations=12)}
 
 
 class Counted:
@@ -31,9 +34,10 @@ class Counted:
         return value, slope, np.array([[value, 2 * value], [0.0, np.inf]])
 
 
-def run(path: Path, loss: Counted, key: str = "a") -> tuple:
+def run(path: Path, loss: Counted, key: str = "a", method: Method = "sqp") -> tuple:
+    start = np.array([-1.0, 0.5])
     with Journal(path, key) as journal:
-        found = minimise("sqp", journal.wrap(loss), in_disc, np.array([-1.0, 0.5]), options=OPTIONS)
+        found = minimise(method, journal.wrap(loss), in_disc, start, options=METHODS[method])
     record = [(e.x.tobytes(), e.loss, e.accepted, e.radius, e.failure) for e in found.evaluations]
     return found.x.tobytes(), repr(record), journal.replayed
 
@@ -98,38 +102,17 @@ def test_a_flipped_bit_anywhere_ends_in_the_same_result(
     assert path.read_bytes() == content
 
 
-def run_by_mma(path: Path, loss: Counted) -> tuple:
-    start = np.array([-1.0, 0.5])
-    with Journal(path, "mma") as journal:
-        options = MmaOptions(evaluations=12)
-        found = minimise("mma", journal.wrap(loss), in_disc, start, options=options)
-    record = [(e.x.tobytes(), e.loss, e.accepted, e.radius, e.failure) for e in found.evaluations]
-    return found.x.tobytes(), repr(record)
-
-
-@pytest.mark.parametrize("dies_at", [0, 1, 5, 11])
-def test_moving_asymptotes_resume_where_they_were(tmp_path: Path, dies_at: int) -> None:
-    whole = run_by_mma(tmp_path / "whole", Counted())
-    with pytest.raises(KeyboardInterrupt):
-        run_by_mma(tmp_path / "killed", Counted(dies_at))
-    loss = Counted()
-    assert run_by_mma(tmp_path / "killed", loss) == whole
-    assert loss.calls == 12 - dies_at
-    assert (tmp_path / "killed").read_bytes() == (tmp_path / "whole").read_bytes()
-
-
-@pytest.mark.parametrize("dies_at", [0, 1, 5])
+@pytest.mark.parametrize(("method", "dies_at"), [*product(METHODS, (0, 1, 5)), ("mma", 11)])
 def test_interrupted_runs_resume_where_they_were(
-    complete: Complete, tmp_path: Path, dies_at: int
+    tmp_path: Path, method: Method, dies_at: int
 ) -> None:
-    data, outcome, calls = complete
-    path = tmp_path / "run"
+    whole, loss = Counted(), Counted()
+    outcome = run(tmp_path / "whole", whole, method=method)
     with pytest.raises(KeyboardInterrupt):
-        run(path, Counted(dies_at))
-    loss = Counted()
-    assert run(path, loss)[:2] == outcome[:2]
-    assert loss.calls == calls - dies_at
-    assert path.read_bytes() == data
+        run(tmp_path / "killed", Counted(dies_at), method=method)
+    assert run(tmp_path / "killed", loss, method=method)[:2] == outcome[:2]
+    assert loss.calls == whole.calls - dies_at
+    assert (tmp_path / "killed").read_bytes() == (tmp_path / "whole").read_bytes()
 
 
 def test_a_journal_of_another_problem_is_started_anew(complete: Complete, tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 from dataclasses import replace
 
-import nlopt
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -16,6 +15,7 @@ from tests.sim.optimise.known_problems import (
     rosenbrock_in_disc,
     shifted_bowl,
 )
+from tests.sim.structures import central
 
 
 def solve(known: Known, **changes: float) -> Result:
@@ -23,44 +23,14 @@ def solve(known: Known, **changes: float) -> Result:
     return minimise("mma", known.loss, known.constraints, known.start, known.bounds, options)
 
 
-def by_nlopt(known: Known, evaluations: int = 500) -> np.ndarray:
-    """The optimum according to nlopt's LD_MMA."""
-    size = len(known.start)
-    lower, upper = known.bounds or (-5.0, 5.0)
-
-    def loss(x: np.ndarray, slope: np.ndarray) -> float:
-        value, gradient, _ = known.loss(x)
-        slope[:] = gradient
-        return value
-
-    def violated(result: np.ndarray, x: np.ndarray, slopes: np.ndarray) -> None:
-        assert known.constraints is not None
-        values, jacobian = known.constraints(x)
-        result[:] = -values
-        if slopes.size:
-            slopes[:] = -jacobian
-
-    solver = nlopt.opt(nlopt.LD_MMA, size)
-    solver.set_min_objective(loss)
-    solver.set_lower_bounds(np.full(size, lower))
-    solver.set_upper_bounds(np.full(size, upper))
-    if known.constraints is not None:
-        count = len(known.constraints(known.start)[0])
-        solver.add_inequality_mconstraint(violated, np.full(count, 1e-9))
-    solver.set_maxeval(evaluations)
-    solver.set_xtol_rel(1e-9)
-    return solver.optimize(known.start)
-
-
 @pytest.mark.parametrize(
     ("known", "tolerance"),
     [(corner(), 1e-5), (shifted_bowl(), 1e-4), (cantilever(), 5e-3)],
     ids=["corner", "bowl", "cantilever"],
 )
-def test_known_optima_which_are_nlopts_too(known: Known, tolerance: float) -> None:
+def test_known_optima(known: Known, tolerance: float) -> None:
     found = solve(known)
     np.testing.assert_allclose(found.x, known.optimum, atol=tolerance)
-    np.testing.assert_allclose(found.x, by_nlopt(known), atol=tolerance)
     assert found.violation == 0.0
 
 
@@ -163,21 +133,13 @@ def test_subproblem_satisfies_its_optimality_conditions(size: int, count: int) -
 
 
 def test_subproblem_slopes_and_curvature_agree_with_differences() -> None:
-    problem = separable(5, 3)
-    x, step = np.linspace(-0.5, 0.5, 5), 1e-5
-    weights = np.array([1.0, 0.3, 0.2, 0.7])
-    ahead, behind = (problem.values(x + sign * step * np.eye(5)[1]) for sign in (1, -1))
-    np.testing.assert_allclose(
-        problem.slopes(x).toarray()[:, 1], (ahead - behind) / (2 * step), rtol=1e-7
-    )
-    ahead, behind = (problem.slopes(x + sign * step * np.eye(5)[1]) for sign in (1, -1))
-    bend = ((ahead - behind).T @ weights)[1] / (2 * step)
-    assert problem.curvature(x, weights)[1] == pytest.approx(bend, rel=1e-4)
-
-
-def test_replacements_touch_the_functions_at_the_centre() -> None:
-    problem = separable(7, 4)
+    problem, x, way = separable(5, 3), np.linspace(-0.5, 0.5, 5), np.eye(5)[1]
     np.testing.assert_allclose(problem.values(problem.centre), problem.at_centre)
+    weights = np.array([1.0, 0.3, 0.2, 0.7])
+    slopes = central(lambda step: problem.values(x + step * way), 1e-5)
+    np.testing.assert_allclose(problem.slopes(x).toarray()[:, 1], slopes, rtol=1e-7)
+    bends = central(lambda step: (problem.slopes(x + step * way).T @ weights)[1], 1e-5)
+    assert problem.curvature(x, weights)[1] == pytest.approx(bends, rel=1e-4)
 
 
 def test_designs_whose_constraints_cannot_be_evaluated_are_avoided() -> None:

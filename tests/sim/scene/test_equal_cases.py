@@ -7,21 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import sim
 from benchmarks.scenes import MATERIAL
 from sim.core import Ints
-from sim.scene import (
-    Clamp,
-    Loads,
-    Objective,
-    Scene,
-    Structure,
-    concrete_parameters,
-    make_plan,
-    simulate,
-)
 from sim.scene.equal_cases import equal_cases, quarter_turn
-from sim.solvers import LinearRamp, MotionLaw, PrescribedMotion, Pulse, TanhRamp
-from sim.structure import design_space, quads
+from sim.structure import design_space
 from tests.sim.structures import mixed_polygons, rotating_squares
 
 LATTICE = rotating_squares()
@@ -31,20 +21,22 @@ EDGES = LEFT, np.array([1, 2, 3]), LEFT + 4, np.array([21, 22, 23])
 """Units of the left, lower, right and upper edge."""
 
 
-def scene(*cases: tuple[Ints, MotionLaw], **changes: Any) -> Scene:  # noqa: ANN401
+def scene(*cases: tuple[Ints, sim.MotionLaw], **changes: Any) -> sim.Scene:  # noqa: ANN401
     """5 x 5 squares, corners clamped, units between the edge and the middle of interest."""
-    pairs = cases or tuple((MIDDLE, LinearRamp(2.0, 1.0, a)) for a in (0.3, 0.3 + np.pi / 2))
-    made = Scene(
-        Structure(LATTICE, MATERIAL),
-        Loads(tuple(PrescribedMotion(*pair) for pair in pairs), (Clamp(CORNERS),), static=True),
-        Objective(region=np.array([6, 8, 16, 18]), steps=2),
+    pairs = cases or tuple((MIDDLE, sim.LinearRamp(2.0, 1.0, a)) for a in (0.3, 0.3 + np.pi / 2))
+    made = sim.Scene(
+        sim.Structure(LATTICE, MATERIAL),
+        sim.Loads(
+            tuple(sim.PrescribedMotion(*pair) for pair in pairs), (sim.Clamp(CORNERS),), static=True
+        ),
+        sim.Objective(region=np.array([6, 8, 16, 18]), steps=2),
     )
     return made.updated(**changes)
 
 
-def found(posed: Scene) -> list[int]:
+def found(posed: sim.Scene) -> list[int]:
     vertices = posed.lattice.vertices
-    return list(equal_cases(posed, vertices, concrete_parameters(posed, vertices)))
+    return list(equal_cases(posed, vertices, sim.concrete_parameters(posed, vertices)))
 
 
 def right_half(of_unit: bool) -> np.ndarray:
@@ -60,8 +52,8 @@ def uneven(field: str, of_unit: bool) -> dict[str, Any]:
 
 
 SUPPORTS = {
-    "a free corner": {"supports": (Clamp(CORNERS[:-1]),)},
-    "half-clamped corners": {"supports": (Clamp(CORNERS, ("ux",)),)},
+    "a free corner": {"supports": (sim.Clamp(CORNERS[:-1]),)},
+    "half-clamped corners": {"supports": (sim.Clamp(CORNERS, ("ux",)),)},
     "region": {"region": np.array([6, 7])},
 }
 CONSTANTS = {
@@ -81,7 +73,9 @@ NETWORKS = {
 
 def test_a_quarter_turn_makes_cases_equal() -> None:
     assert found(scene()) == [0, 0]
-    turned = [LinearRamp(2.0, 1.0, np.deg2rad(a)) for a in (0.0, 45.0, 90.0, 135.0, -180.0, 10.0)]
+    turned = [
+        sim.LinearRamp(2.0, 1.0, np.deg2rad(a)) for a in (0.0, 45.0, 90.0, 135.0, -180.0, 10.0)
+    ]
     assert found(scene(*((MIDDLE, motion) for motion in turned))) == [0, 1, 0, 1, 0, 5]
 
 
@@ -97,8 +91,8 @@ def test_what_the_turn_does_not_keep_makes_them_differ(changes: dict[str, Any]) 
 def test_each_case_of_an_uneven_structure_has_its_own_loss(changes: dict[str, Any]) -> None:
     posed = scene(**changes)
     vertices = posed.lattice.vertices
-    short = simulate(posed, vertices=vertices, plan=make_plan(posed, vertices)).losses
-    each = [float(simulate(posed.alone(case), vertices=vertices).loss) for case in (0, 1)]
+    short = sim.simulate(posed, vertices=vertices, plan=sim.make_plan(posed, vertices)).losses
+    each = [float(sim.simulate(posed.alone(case), vertices=vertices).loss) for case in (0, 1)]
     assert abs(each[0] - each[1]) > 1e-3 * each[0]
     np.testing.assert_allclose(short, each, rtol=1e-9)
 
@@ -109,21 +103,23 @@ def test_an_even_change_of_constants_keeps_them_equal() -> None:
 
 
 def test_driven_units_are_turned_with_their_motion() -> None:
-    inwards = [(edge, LinearRamp(1.0, 1.0, k * np.pi / 2)) for k, edge in enumerate(EDGES)]
+    inwards = [(edge, sim.LinearRamp(1.0, 1.0, k * np.pi / 2)) for k, edge in enumerate(EDGES)]
     assert found(scene(*inwards)) == [0, 0, 0, 0]
-    both_to_the_right = [(edge, LinearRamp(1.0, 1.0, 0.0)) for edge in EDGES]
+    both_to_the_right = [(edge, sim.LinearRamp(1.0, 1.0, 0.0)) for edge in EDGES]
     assert found(scene(*both_to_the_right)) == [0, 1, 2, 3]
-    one_alone = [(edge, LinearRamp(1.0, 1.0, k * np.pi / 2)) for k, edge in enumerate(EDGES[:2])]
+    one_alone = [
+        (edge, sim.LinearRamp(1.0, 1.0, k * np.pi / 2)) for k, edge in enumerate(EDGES[:2])
+    ]
     assert found(scene(*one_alone)) == [0, 1]  # the other edges are held by neither
 
 
 @pytest.mark.parametrize(
     "other",
-    [TanhRamp(2.0, 1.0, 0.0), Pulse(2.0, 1.0, 0.0), LinearRamp(2.5, 1.0, 0.0)],
+    [sim.TanhRamp(2.0, 1.0, 0.0), sim.Pulse(2.0, 1.0, 0.0), sim.LinearRamp(2.5, 1.0, 0.0)],
     ids=["law", "pulse", "amplitude"],
 )
-def test_motions_of_another_kind_are_no_copies(other: MotionLaw) -> None:
-    assert found(scene((MIDDLE, LinearRamp(2.0, 1.0, 0.0)), (MIDDLE, other))) == [0, 1]
+def test_motions_of_another_kind_are_no_copies(other: sim.MotionLaw) -> None:
+    assert found(scene((MIDDLE, sim.LinearRamp(2.0, 1.0, 0.0)), (MIDDLE, other))) == [0, 1]
 
 
 def test_the_image_of_rotating_squares() -> None:
@@ -144,18 +140,18 @@ def test_a_structure_without_the_symmetry_has_no_image() -> None:
 
 def test_large_lattices_need_little_memory_and_one_case_none() -> None:
     """Distances of all pairs of 3600 units would take 200 MB."""
-    large = quads(60, 60, 15.0, 2.25, np.deg2rad(20.0))
+    large = sim.quads(60, 60, 15.0, 2.25, np.deg2rad(20.0))
     corners = np.array([0, 59, 3540, 3599])
     posed = scene(
-        (corners, LinearRamp(1.0, 1.0, 0.0)), (corners, LinearRamp(1.0, 1.0, np.pi / 2)),
+        (corners, sim.LinearRamp(1.0, 1.0, 0.0)), (corners, sim.LinearRamp(1.0, 1.0, np.pi / 2)),
         lattice=large, supports=(), region=np.zeros(0, dtype=int),
     )  # fmt: skip
-    values = concrete_parameters(posed, large.vertices)
+    values = sim.concrete_parameters(posed, large.vertices)
     assert _peak(posed, values) < 20e6
     assert _peak(posed.alone(0), values) < 1e4
 
 
-def _peak(posed: Scene, values: Any) -> int:  # noqa: ANN401
+def _peak(posed: sim.Scene, values: Any) -> int:  # noqa: ANN401
     tracemalloc.start()
     try:
         equal_cases(posed, posed.lattice.vertices, values)

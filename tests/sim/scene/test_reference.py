@@ -8,16 +8,9 @@ import numpy as np
 import pytest
 from jax import Array
 
+import sim
 from sim.core import Floats
-from sim.scene import (
-    Accuracy,
-    DisplacementMimicking,
-    Scene,
-    StrainEnergyMimicking,
-    concrete_parameters,
-    make_plan,
-    parameters_of_design,
-)
+from sim.scene import Accuracy, DisplacementMimicking, StrainEnergyMimicking, parameters_of_design
 from sim.solvers import differentiable_motion, solve_case
 from sim.structure import shape
 from tests.sim.reference_scenes import (
@@ -46,7 +39,7 @@ def test_lattice_is_the_references() -> None:
 
 def test_inertia_and_damping_are_the_references() -> None:
     scene, stored = scene_a(), reference("A")
-    values = concrete_parameters(scene, scene.lattice.vertices)
+    values = sim.concrete_parameters(scene, scene.lattice.vertices)
     np.testing.assert_allclose(
         values.mass, stored["inertia_tonne_tonne_tonnemm2"], rtol=1e-11, atol=0
     )
@@ -70,7 +63,7 @@ class Outcome(NamedTuple):
 
 def outcome_of_scene_a(accuracy: Accuracy) -> Outcome:
     scene = scene_a(accuracy=accuracy)
-    plan = make_plan(scene, times=SAMPLES)
+    plan = sim.make_plan(scene, times=SAMPLES)
     measure = DisplacementMimicking(
         scene.objective.region, scene.lattice.spacing, np.ones(len(SAMPLES))
     )
@@ -113,8 +106,8 @@ def test_scene_a_at_default_accuracy() -> None:
 def test_error_estimate_by_halving_the_steps() -> None:
     """Each step cut in two: what changes is the true error within a factor of 3."""
     scene, stored = scene_a(), reference("A")
-    solver = make_plan(scene, times=SAMPLES).solver
-    values = concrete_parameters(scene, scene.lattice.vertices)
+    solver = sim.make_plan(scene, times=SAMPLES).solver
+    values = sim.concrete_parameters(scene, scene.lattice.vertices)
     scale = np.array([15.0, 15.0, 1.0])
 
     def in_region(motion: Floats) -> Floats:
@@ -129,7 +122,7 @@ def test_error_estimate_by_halving_the_steps() -> None:
     assert 1 / 3 < (losses[0] - losses[1]) / (losses[0] - losses[2]) < 3
 
 
-def static_measure(scene: Scene, name: str, n_loads: int) -> StrainEnergyMimicking:
+def static_measure(scene: sim.Scene, name: str, n_loads: int) -> StrainEnergyMimicking:
     ligaments = np.flatnonzero(reference(name)["roi_bond_mask"])
     return StrainEnergyMimicking(
         ligaments, scene.lattice.ligament_units[ligaments], np.ones(n_loads)
@@ -140,7 +133,7 @@ def static_measure(scene: Scene, name: str, n_loads: int) -> StrainEnergyMimicki
 def test_final_equilibrium(name: str) -> None:
     scene, stored = compressed(name), reference(name)
     end = np.array([scene.loads.duration])
-    plan = make_plan(scene, times=end)
+    plan = sim.make_plan(scene, times=end)
     measure, of_design = static_measure(scene, name, 1), parameters_of_design(scene)
 
     def loss(design: Array) -> tuple[Array, Array]:
@@ -159,8 +152,8 @@ def test_final_equilibrium(name: str) -> None:
 def test_path_of_scene_b() -> None:
     scene, stored = compressed("B"), reference("B")
     amplitudes = stored["static_path_amps_mm"]
-    plan = make_plan(scene, times=amplitudes)
-    values = concrete_parameters(scene, scene.lattice.vertices)
+    plan = sim.make_plan(scene, times=amplitudes)
+    values = sim.concrete_parameters(scene, scene.lattice.vertices)
     motion = differentiable_motion(plan.solver, values, scene.loads.cases).displacement[0]
     np.testing.assert_allclose(motion, stored["static_path_u"], rtol=0, atol=1e-6)
     measure = static_measure(scene, "B", 1)

@@ -6,39 +6,35 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import sim
 from sim.core import Floats
 from sim.energy import ligament_strain, topology
 from sim.quasistatics import StaticSolver
-from sim.scene import (
-    Clamp,
-    Loads,
-    Scene,
-    Structure,
-    as_built,
-    concrete_parameters,
-    evaluate,
-    make_plan,
-    relaxed,
-    simulate,
-)
-from sim.solvers import Harmonic, LinearRamp, MotionLaw, PrescribedMotion
-from sim.structure import Material, quads
+from sim.scene import as_built, relaxed
+from tests.sim.structures import taylor_orders
 
-PLAIN = Material(6.18e-9, 120.0, 1.19, 1.5, 1.5, 1e-8, 1e-7)
+PLAIN = sim.Material(6.18e-9, 120.0, 1.19, 1.5, 1.5, 1e-8, 1e-7)
 
 
-def scene(material: Material, motion: MotionLaw | None = None, static: bool = True) -> Scene:
+def scene(
+    material: sim.Material, motion: sim.MotionLaw | None = None, static: bool = True
+) -> sim.Scene:
     """Four by three squares, the left column clamped, the right one pulled."""
-    lattice = quads(4, 3, 15.0, 2.25, np.deg2rad(20.0))
+    lattice = sim.quads(4, 3, 15.0, 2.25, np.deg2rad(20.0))
     right, left = np.array([3, 7, 11]), np.array([0, 4, 8])
-    law = LinearRamp(-1.0, 1.0, 0.0) if motion is None else motion
-    loads = Loads((PrescribedMotion(right, law),), (Clamp(left),), static=static, duration=1.0)
-    return Scene(Structure(lattice, material), loads)
+    law = sim.LinearRamp(-1.0, 1.0, 0.0) if motion is None else motion
+    loads = sim.Loads(
+        (sim.PrescribedMotion(right, law),), (sim.Clamp(left),), static=static, duration=1.0
+    )
+    return sim.Scene(sim.Structure(lattice, material), loads)
 
 
-def bent(size: float = 0.3) -> Material:
+STEPS = np.array([1e-2, 5e-3, 2.5e-3])
+
+
+def bent(size: float = 0.3) -> sim.Material:
     rng = np.random.default_rng(3)
-    n = quads(4, 3, 15.0, 2.25, 0.3).n_ligaments
+    n = sim.quads(4, 3, 15.0, 2.25, 0.3).n_ligaments
     return PLAIN._replace(
         end_angles=size * rng.normal(size=(n, 2)), elongation=0.02 * rng.normal(size=n)
     )
@@ -46,7 +42,7 @@ def bent(size: float = 0.3) -> Material:
 
 def test_a_strip_is_free_of_stress_once_its_clamps_are_in_line() -> None:
     a, b = 0.3, -0.1
-    made = concrete_parameters(
+    made = sim.concrete_parameters(
         scene(PLAIN._replace(end_angles=np.array([a, b]))), scene(PLAIN).lattice.vertices
     )
     vector, still = jnp.array([2.25, 0.0]), jnp.zeros(3)
@@ -59,7 +55,7 @@ def test_a_strip_is_free_of_stress_once_its_clamps_are_in_line() -> None:
 
 def test_without_a_natural_state_nothing_changes_by_a_bit() -> None:
     zeros = PLAIN._replace(end_angles=np.zeros((17, 2)), elongation=np.zeros(17))
-    one, other = simulate(scene(PLAIN)), simulate(scene(zeros))
+    one, other = sim.simulate(scene(PLAIN)), sim.simulate(scene(zeros))
     assert np.array_equal(one.displacement, other.displacement)
     at_rest = relaxed(scene(PLAIN))
     assert np.array_equal(at_rest.motion, np.zeros((12, 3)))
@@ -75,7 +71,7 @@ def test_a_relaxed_structure_rests_and_answers_as_the_one_it_was(static: bool) -
     assert np.abs(again.motion).max() < 1e-9
     if static:
         path, moved = (
-            simulate(each, times=np.array([0.5, 1.0])) for each in (plain, at_rest.scene)
+            sim.simulate(each, times=np.array([0.5, 1.0])) for each in (plain, at_rest.scene)
         )
         from_rest = np.asarray(path.displacement) - at_rest.motion
         np.testing.assert_allclose(moved.displacement, from_rest, atol=1e-8)
@@ -84,14 +80,17 @@ def test_a_relaxed_structure_rests_and_answers_as_the_one_it_was(static: bool) -
         np.testing.assert_allclose(strained[0], strained[1], rtol=1e-8)
     else:
         shaken = at_rest.scene.updated(
-            cases=(PrescribedMotion(plain.loads.driven, Harmonic(0.0, 5.0, 0.0)),), static=False
+            cases=(sim.PrescribedMotion(plain.loads.driven, sim.Harmonic(0.0, 5.0, 0.0)),),
+            static=False,
         )
-        assert np.abs(simulate(shaken, times=np.linspace(0.0, 0.1, 5)).displacement).max() < 1e-8
+        assert (
+            np.abs(sim.simulate(shaken, times=np.linspace(0.0, 0.1, 5)).displacement).max() < 1e-8
+        )
 
 
 def test_derivatives_by_the_natural_state_pass_the_taylor_test() -> None:
     posed = scene(bent())
-    values = concrete_parameters(posed, posed.lattice.vertices)
+    values = sim.concrete_parameters(posed, posed.lattice.vertices)
     joined = topology(posed.lattice, posed.loads.held, posed.structure.contact)
     solver = StaticSolver(joined, np.array([0.5, 1.0]), relative=1e-13)
     rng = np.random.default_rng(5)
@@ -104,19 +103,13 @@ def test_derivatives_by_the_natural_state_pass_the_taylor_test() -> None:
         shifted = values._replace(natural=values.natural + step * way.natural)
         return float((solver.forward(shifted, posed.loads.cases[0])[0] * weight).sum())
 
-    def remainder(step: float) -> float:
-        return abs(value(step) - value(0.0) - step * slope)
-
     _, _, record = solver.forward(values, posed.loads.cases[0])
     bar: Floats = solver.backward(values, record, weight, np.zeros_like(weight))[0].natural
     slope = float((bar * way.natural).sum())
-    steps = np.array([1e-2, 5e-3, 2.5e-3])
-    left = [remainder(step) for step in steps]
-    order = np.log2(np.array(left[:-1]) / left[1:])
-    np.testing.assert_allclose(order, 2.0, atol=0.1)
+    np.testing.assert_allclose(taylor_orders(value, slope, STEPS), 2.0, atol=0.1)
 
 
-def pulled(kind: Literal["displacement", "strain_energy"]) -> Scene:
+def pulled(kind: Literal["displacement", "strain_energy"]) -> sim.Scene:
     """The squares, two in the middle of which are to rest."""
     return scene(PLAIN).updated(region=np.array([5, 6]), kind=kind, steps=2)
 
@@ -140,14 +133,14 @@ def test_a_bent_shim_turns_units_and_only_what_loads_add_counts() -> None:
 
 
 def test_a_symmetric_design_is_built_with_shims_that_are_not() -> None:
-    lattice = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0))
-    loads = Loads(
-        (PrescribedMotion(np.array([12]), LinearRamp(0.5, 1.0, 0.0)),),
-        (Clamp(np.array([0, 4, 20, 24])),),
+    lattice = sim.quads(5, 5, 15.0, 2.25, np.deg2rad(20.0))
+    loads = sim.Loads(
+        (sim.PrescribedMotion(np.array([12]), sim.LinearRamp(0.5, 1.0, 0.0)),),
+        (sim.Clamp(np.array([0, 4, 20, 24])),),
         static=True,
         duration=1.0,
     )
-    posed = Scene(Structure(lattice, PLAIN), loads).updated(
+    posed = sim.Scene(sim.Structure(lattice, PLAIN), loads).updated(
         region=np.array([2]), steps=2, cloak=np.array([7, 11, 13, 17]), symmetry="C4"
     )
     assert posed.space.n_variables < 8
@@ -155,7 +148,7 @@ def test_a_symmetric_design_is_built_with_shims_that_are_not() -> None:
     assert as_built(posed, lattice.vertices, angles).loss_as_built > 0.0
 
 
-def turning(kind: Literal["displacement", "strain_energy"], **changes: object) -> Scene:
+def turning(kind: Literal["displacement", "strain_energy"], **changes: object) -> sim.Scene:
     """The squares, whose middle is redesigned with the slots that hold its ligaments."""
     return pulled(kind).updated(cloak=np.array([5, 6]), turning_slots=True, **changes)
 
@@ -167,33 +160,31 @@ def test_designs_with_turned_slots_are_those_built_and_pass_the_taylor_test(
 ) -> None:
     posed = turning(kind)
     if not static:
-        shaken = PrescribedMotion(posed.loads.driven, Harmonic(1.0, 5.0, 0.0))
+        shaken = sim.PrescribedMotion(posed.loads.driven, sim.Harmonic(1.0, 5.0, 0.0))
         posed = posed.updated(cases=(shaken,), static=False, steps=None, samples=21, duration=0.2)
     rng = np.random.default_rng(4)
     design, way = rng.normal(size=(2, posed.space.n_variables))
-    plan = make_plan(posed)
-    loss, gradient = evaluate(posed, design, plan)
+    plan = sim.make_plan(posed)
+    loss, gradient = sim.evaluate(posed, design, plan)
     plain = posed.updated(turning_slots=False)
     angles = np.asarray(posed.space.end_angles(design))
     assert np.abs(angles).max() > 0.2
     built = as_built(plain, np.asarray(posed.space.vertices(design)), angles)
     assert loss == pytest.approx(built.loss_as_built, rel=1e-8 if static else 1e-3)
-    steps = np.array([1e-2, 5e-3, 2.5e-3])
-    left = [
-        abs(evaluate(posed, design + step * way, plan)[0] - loss - step * gradient @ way)
-        for step in steps
-    ]
-    np.testing.assert_allclose(np.log2(np.array(left[:-1]) / left[1:]), 2.0, atol=0.15)
+    orders = taylor_orders(
+        lambda step: sim.evaluate(posed, design + step * way, plan)[0], gradient @ way, STEPS
+    )
+    np.testing.assert_allclose(orders, 2.0, atol=0.15)
 
 
 @pytest.mark.parametrize("symmetry", ["C4", "mirror_x", "mirror_y"])
 def test_slots_turn_as_the_symmetry_asks_for(symmetry: Literal["C4", "mirror_x"]) -> None:
     """A structure with them comes to rest in a state of that symmetry."""
-    lattice = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0 if symmetry == "C4" else 0.0))
+    lattice = sim.quads(5, 5, 15.0, 2.25, np.deg2rad(20.0 if symmetry == "C4" else 0.0))
     middle, corners = np.array([12]), np.array([0, 4, 20, 24])
-    still = PrescribedMotion(middle, LinearRamp(0.0, 1.0, 0.0))
-    loads = Loads((still,), (Clamp(corners),), static=True, duration=1.0)
-    posed = Scene(Structure(lattice, PLAIN), loads).updated(
+    still = sim.PrescribedMotion(middle, sim.LinearRamp(0.0, 1.0, 0.0))
+    loads = sim.Loads((still,), (sim.Clamp(corners),), static=True, duration=1.0)
+    posed = sim.Scene(sim.Structure(lattice, PLAIN), loads).updated(
         region=np.array([2]), cloak=np.arange(25), symmetry=symmetry, turning_slots=True
     )
     design = np.random.default_rng(5).normal(size=posed.space.n_variables)

@@ -9,6 +9,7 @@ from sim.core import Floats
 from sim.scene import Evaluator, Scene, combined, make_plan
 from sim.solvers import Harmonic, Pulse
 from tests.sim.scene.test_plan import ANGLES, design_of, scene
+from tests.sim.structures import central
 
 LOSSES, WEIGHTS = jnp.array([0.2, 1.0, 0.7]), jnp.array([0.5, 0.25, 0.25])
 
@@ -23,9 +24,9 @@ def test_the_p_mean_goes_from_the_mean_to_the_largest() -> None:
 
 def test_the_gradient_of_the_p_mean() -> None:
     slope = jax.grad(lambda x: combined(x, WEIGHTS, 8.0))(LOSSES)
-    for k, step in enumerate(1e-6 * np.eye(3)):
-        ahead, behind = (float(combined(LOSSES + s, WEIGHTS, 8.0)) for s in (step, -step))
-        assert float(slope[k]) == pytest.approx((ahead - behind) / 2e-6, rel=1e-6, abs=1e-9)
+    steps = np.eye(3)
+    found = central(lambda h: [float(combined(LOSSES + h * e, WEIGHTS, 8.0)) for e in steps], 1e-6)
+    np.testing.assert_allclose(slope, found, rtol=1e-6, atol=1e-9)
 
 
 def robust(angles: Floats = ANGLES) -> Scene:
@@ -48,8 +49,8 @@ def test_the_evaluator_is_the_derivative_of_the_loss_which_is_the_mean_over_copi
     assert posed.loads.case_weights @ each < value < each.max()
     steepest = float(np.linalg.norm(gradient))
     way = gradient / steepest
-    ahead, behind = (evaluate(design + s * way)[0] for s in (1e-4, -1e-4))
-    assert steepest == pytest.approx((ahead - behind) / 2e-4, rel=1e-4)
+    found = central(lambda h: evaluate(design + h * way)[0], 1e-4)
+    assert steepest == pytest.approx(found, rel=1e-4)
     assert posed.design.copies is not None
     alone = []
     for shifts in posed.design.copies:

@@ -7,47 +7,37 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.constraints import Limits
-from sim.optimise import SqpOptions
-from sim.scene import (
-    Evaluator,
-    Scene,
-    concrete_parameters,
-    estimated_errors,
-    make_plan,
-    minimise,
-    sample_times,
-    scales,
-    simulate,
-)
+import sim
+from sim.scene import concrete_parameters, estimated_errors, sample_times, scales
 from sim.scene.time_solver import RULES, different_drives, expected_steps
-from sim.solvers import Harmonic, MotionLaw, Pulse, TimeSeries, breakpoints, solve_case
-from sim.structure import ContactModel, DistanceContact, VoidAngleContact
+from sim.solvers import breakpoints, solve_case
+from sim.structure import ContactModel
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 from tests.sim.scene.test_plan import design_of
 from tests.sim.scene.test_plan import scene as seven_by_seven
+from tests.sim.structures import central, taylor_orders
 
 KNOTS = np.linspace(0.0, 0.2, 201)
 SPIKE = np.where(np.arange(201) == 120, 0.3, 0.0)[:, None] * [1.0, 0.5, 0.0]
-DRIVES: dict[str, MotionLaw] = {
-    "slow": Harmonic(3.0, 5.0, 0.6),
-    "near the lowest eigenfrequency": Harmonic(2.0, 60.0, 0.6),
-    "a short late pulse": Pulse(2.0, 0.002, 0.6, 0.13),
-    "a spike": TimeSeries(KNOTS, SPIKE),
+DRIVES: dict[str, sim.MotionLaw] = {
+    "slow": sim.Harmonic(3.0, 5.0, 0.6),
+    "near the lowest eigenfrequency": sim.Harmonic(2.0, 60.0, 0.6),
+    "a short late pulse": sim.Pulse(2.0, 0.002, 0.6, 0.13),
+    "a spike": sim.TimeSeries(KNOTS, SPIKE),
 }
 
 
-def posed(motion: MotionLaw, **changes: Any) -> Scene:  # noqa: ANN401  (fields of a scene)
+def posed(motion: sim.MotionLaw, **changes: Any) -> sim.Scene:  # noqa: ANN401  (fields of a scene)
     return seven_by_seven((motion,), weights=np.ones(1), **changes)
 
 
 @pytest.mark.parametrize("drive", DRIVES)
 def test_errors_are_those_that_were_asked_for_and_stated(drive: str) -> None:
     scene = posed(DRIVES[drive])
-    values, times = concrete_parameters(scene, scene.lattice.vertices), sample_times(scene)
+    values, times = sim.concrete_parameters(scene, scene.lattice.vertices), sim.sample_times(scene)
     fine = ExplicitSolver(scene.topology, float(times[-1]), 20_000, times)
     exact = solve_case(fine, values, scene.loads.cases[0])[0]
-    response = simulate(scene, vertices=scene.lattice.vertices)
+    response = sim.simulate(scene, vertices=scene.lattice.vertices)
     finer = response.refined()
     seen = [
         motion.reshape(len(times), -1, 3)[:, scene.objective.region] / scales(15.0)
@@ -66,7 +56,7 @@ def test_errors_are_those_that_were_asked_for_and_stated(drive: str) -> None:
 @pytest.mark.parametrize("drive", ["a short late pulse", "a spike"])
 def test_implicit_steps_end_where_a_drive_turns(drive: str) -> None:
     scene = posed(DRIVES[drive], integrator="implicit", accuracy="draft")
-    solver = make_plan(scene).solver
+    solver = sim.make_plan(scene).solver
     assert isinstance(solver, ImplicitSolver)
     turns = breakpoints(DRIVES[drive], 0.2)
     assert len(turns) >= 3
@@ -76,14 +66,14 @@ def test_implicit_steps_end_where_a_drive_turns(drive: str) -> None:
 @pytest.mark.parametrize(
     ("motion", "duration"),
     [
-        (Harmonic(3.0, 2.0, 0.6), 1.0),
+        (sim.Harmonic(3.0, 2.0, 0.6), 1.0),
         (DRIVES["near the lowest eigenfrequency"], 0.2),
         (DRIVES["a short late pulse"], 0.2),
     ],
 )
-def test_steps_are_guessed_without_a_solve(motion: MotionLaw, duration: float) -> None:
+def test_steps_are_guessed_without_a_solve(motion: sim.MotionLaw, duration: float) -> None:
     scene = posed(motion, duration=duration, frequency=getattr(motion, "frequency", None))
-    values, solver = concrete_parameters(scene, scene.lattice.vertices), make_plan(scene).solver
+    values, solver = concrete_parameters(scene, scene.lattice.vertices), sim.make_plan(scene).solver
     integrator, guessed = expected_steps(scene, values, sample_times(scene))
     if isinstance(solver, ImplicitSolver):
         steps, kind = len(solver.times) - 1, "implicit"
@@ -96,22 +86,24 @@ def test_steps_are_guessed_without_a_solve(motion: MotionLaw, duration: float) -
 
 def test_a_straight_series_has_no_kinks() -> None:
     ramp = np.outer(KNOTS, [1.0, 2.0, 0.0])
-    assert len(breakpoints(TimeSeries(KNOTS, ramp), 0.2)) == 0
-    np.testing.assert_allclose(breakpoints(TimeSeries(KNOTS, SPIKE), 0.2), [0.119, 0.12, 0.121])
+    assert len(breakpoints(sim.TimeSeries(KNOTS, ramp), 0.2)) == 0
+    np.testing.assert_allclose(breakpoints(sim.TimeSeries(KNOTS, SPIKE), 0.2), [0.119, 0.12, 0.121])
 
 
 def test_explicit_steps_of_a_tight_run_are_shorter() -> None:
     found = {}
     for accuracy in ("default", "tight"):
         scene = posed(DRIVES["a short late pulse"], integrator="explicit", accuracy=accuracy)
-        solver = make_plan(scene).solver
+        solver = sim.make_plan(scene).solver
         assert isinstance(solver, ExplicitSolver)
         found[accuracy] = solver.n_steps
     assert found["tight"] > 1.5 * found["default"]
 
 
 def test_drives_that_differ_by_direction_are_tried_once() -> None:
-    scene = seven_by_seven((*(Harmonic(3.0, 5.0, k) for k in (0.0, 1.0)), Harmonic(3.0, 6.0)))
+    scene = seven_by_seven(
+        (*(sim.Harmonic(3.0, 5.0, k) for k in (0.0, 1.0)), sim.Harmonic(3.0, 6.0))
+    )
     assert len(different_drives(scene)) == 2
 
 
@@ -124,35 +116,33 @@ def test_the_change_of_a_loss_may_vanish_but_not_its_stated_error() -> None:
     assert estimated_errors((one, 0 * one), (1.0, 0.0), 0.0) == (np.inf, np.inf)
 
 
-@pytest.mark.parametrize("law", [None, DistanceContact(2.25 / 12)], ids=["angles", "distances"])
+@pytest.mark.parametrize("law", [None, sim.DistanceContact(2.25 / 12)], ids=["angles", "distances"])
 def test_the_gradient_is_that_of_the_loss_to_almost_all_digits(law: ContactModel | None) -> None:
     """Stages solved to 5e-3 mm/s left a slope of 1.05 and differences that agree to 8e-5."""
     scene = posed(DRIVES["slow"], integrator="implicit", duration=0.4)
     scene = scene if law is None else scene.with_contact(law)
-    assert isinstance(scene.structure.contact, type(law) if law else VoidAngleContact)
-    evaluate, design = Evaluator(scene), design_of(scene, 0.1)
+    assert isinstance(scene.structure.contact, type(law) if law else sim.VoidAngleContact)
+    evaluate, design = sim.Evaluator(scene), design_of(scene, 0.1)
     direction = np.random.default_rng(1).uniform(-1, 1, len(design))
     loss, gradient, _ = evaluate(design)
     slope, steps = gradient @ direction, np.geomspace(1e-2, 1e-4, 3)
-    ahead, behind = (
-        np.array([evaluate(design + s * h * direction)[0] for h in steps]) for s in (1, -1)
-    )
-    remainders = np.abs(ahead - loss - steps * slope) / loss
-    orders = np.diff(np.log(remainders)) / np.diff(np.log(steps))
-    np.testing.assert_allclose(orders, 2.0, atol=0.02)
-    assert remainders[-1] < 1e-10
-    central = (ahead[-1] - behind[-1]) / (2 * steps[-1])
-    assert slope == pytest.approx(central, rel=2e-7)
+
+    def value(step: float) -> float:
+        return evaluate(design + step * direction)[0]
+
+    np.testing.assert_allclose(taylor_orders(value, slope, steps), 2.0, atol=0.02)
+    assert abs(value(1e-4) - loss - 1e-4 * slope) < 1e-10 * loss
+    assert slope == pytest.approx(central(value, 1e-4), rel=2e-7)
 
 
 def test_an_optimiser_checks_its_steps_at_the_start_and_the_end(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     scene = posed(DRIVES["slow"], integrator="implicit")
-    plan, limits = make_plan(scene), Limits(edge_length=5.0)
+    plan, limits = sim.make_plan(scene), sim.Limits(edge_length=5.0)
     with caplog.at_level(logging.INFO, "sim.scene.evaluation"):
         for asked in (scene, scene.updated(accuracy="tight")):
-            minimise(asked, limits, options=SqpOptions(evaluations=2), plan=plan)
+            sim.minimise(asked, limits, options=sim.SqpOptions(evaluations=2), plan=plan)
     told = [record.message for record in caplog.records if record.levelname == "INFO"]
     warned = [record for record in caplog.records if record.levelname == "WARNING"]
     places = [name for line in told for name in ("start", "end") if name in line]

@@ -6,26 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.scenes import MATERIAL
 from sim.core import Floats
 from sim.optimise import Evaluate, Journal, SqpOptions, minimise
-from sim.scene import Clamp, Design, Evaluator, Loads, Objective, Paths, Scene, Structure, make_plan
-from sim.solvers import LinearRamp, PrescribedMotion
-from tests.sim.structures import rotating_squares
+from sim.scene import Evaluator, Paths, Scene, make_plan
+from tests.sim.structures import pressed
 
 OPTIONS = SqpOptions(evaluations=6, retreats=0)
 
 
 @cache
 def scene() -> Scene:
-    """5 x 5 squares pushed together over four loads; the middle is to be spared of strain."""
-    left = 5 * np.arange(5)
-    return Scene(
-        Structure(rotating_squares(5), MATERIAL),
-        Loads((PrescribedMotion(left + 4, LinearRamp(-7.0, 1.0)),), (Clamp(left),), static=True),
-        Objective(region=np.array([12]), kind="strain_energy", steps=4),
-        Design(cloak=np.array([6, 7, 8, 11, 13, 16, 17, 18])),
-    )
+    return pressed(7.0, kind="strain_energy", steps=4)
 
 
 def run(folder: Path, dies_at: int | None = None) -> bytes:

@@ -19,22 +19,12 @@ from jax import Array
 from jax.flatten_util import ravel_pytree
 from numpy.typing import NDArray
 
+import sim
 from benchmarks.scenes import CUTOFF
 from sim.core import Floats
 from sim.quasistatics import StaticSolver, equilibrium_path
 from sim.quasistatics.equilibrium_path import follow
-from sim.solvers import (
-    DISPLACEMENT,
-    FORCE,
-    Harmonic,
-    LinearRamp,
-    Solver,
-    TimeSeries,
-    Together,
-    adjoint_cases,
-    concrete,
-    solve_cases,
-)
+from sim.solvers import DISPLACEMENT, FORCE, Solver, Together, adjoint_cases, concrete, solve_cases
 from sim.time_integration import (
     BLANES_MOAN,
     LEAPFROG,
@@ -88,7 +78,9 @@ QUANTITIES = ("design", "stiffness", "density", "damping", "drive")
 @cache
 def shaken(bias_deg: float = 20.0, recorded: bool = False, amplitude: float = 2.0) -> Rig:
     """5 x 5 squares with clamped corners, the middle shaken for 1.8 periods of 150 Hz."""
-    motion = measured() if recorded else Harmonic(amplitude, 150.0, 0.6, rise=0.0015, delay=0.003)
+    motion = (
+        measured() if recorded else sim.Harmonic(amplitude, 150.0, 0.6, rise=0.0015, delay=0.003)
+    )
     return Rig(rotating_squares(5, bias_deg), np.array([0, 4, 20, 24]), np.array([12]), motion)
 
 
@@ -96,13 +88,15 @@ def shaken(bias_deg: float = 20.0, recorded: bool = False, amplitude: float = 2.
 def squeezed(depth: float, side: int = 5) -> Rig:
     """Squares between plates, of which one moves in."""
     left = side * np.arange(side)
-    return Rig(rotating_squares(side), left, left + side - 1, LinearRamp(-depth, 1.0))
+    return Rig(rotating_squares(side), left, left + side - 1, sim.LinearRamp(-depth, 1.0))
 
 
 @cache
 def pushed(slowly: bool) -> Rig:
     """Squares clamped at corners, a force on one unit, which may not turn, and one on another."""
-    course = LinearRamp(0.4, 1.0, 2.0) if slowly else Harmonic(0.4, 150.0, 2.0, 0.0015, 0.003)
+    course = (
+        sim.LinearRamp(0.4, 1.0, 2.0) if slowly else sim.Harmonic(0.4, 150.0, 2.0, 0.0015, 0.003)
+    )
     shares, control = (
         np.array([[1.0], [-0.3]]),
         np.array([[FORCE, FORCE, DISPLACEMENT], [FORCE] * 3]),
@@ -118,13 +112,13 @@ def pulled() -> Rig:
     return Rig(mixed_polygons(), np.array([0]), driven, measured(len(driven)))
 
 
-def measured(n_units: int | None = None) -> TimeSeries:
+def measured(n_units: int | None = None) -> sim.TimeSeries:
     """A recorded wave of 41 samples, of all driven units together or of each."""
     times = np.linspace(0.0, DURATION, 41)
     phase = np.arange(3 * (n_units or 1)).reshape(-1, 3)
     wave = np.sin(2 * np.pi * 150.0 * times[:, None, None] + phase) - np.sin(phase)
     motion = np.sin(np.pi * times / DURATION)[:, None, None] * wave * [1.0, 1.0, 0.05]
-    return TimeSeries(times, motion if n_units else motion[:, 0])
+    return sim.TimeSeries(times, motion if n_units else motion[:, 0])
 
 
 @cache
@@ -155,14 +149,14 @@ class Ray:
     def direction(self) -> Numbers:
         """A random change of one quantity alone."""
         rng = np.random.default_rng(7)
-        recorded = isinstance(self.rig.motion, TimeSeries)
+        recorded = isinstance(self.rig.motion, sim.TimeSeries)
         size = 0.1 if self.quantity == "drive" and recorded else 1.0
 
         def change(leaf: Array) -> Array:
             return size * jnp.asarray(rng.normal(size=leaf.shape)) * (jnp.abs(leaf).max() or 1.0)
 
         changed = jax.tree.map(change, getattr(self.rig.numbers, self.quantity))
-        if isinstance(changed, TimeSeries):
+        if isinstance(changed, sim.TimeSeries):
             changed = changed._replace(times=jnp.zeros_like(changed.times))
         still = jax.tree.map(jnp.zeros_like, self.rig.numbers)
         return still._replace(**{self.quantity: changed})
@@ -213,10 +207,30 @@ def assert_exact_in_contact(ray: Ray) -> None:
     assert ray.order_of_remainder(TAYLOR_IN_CONTACT[ray.quantity]) == pytest.approx(2.0, abs=0.05)
 
 
-@pytest.mark.parametrize("quantity", ["design", "stiffness", "drive"])
-def test_equilibria(quantity: str) -> None:
-    rig = squeezed(4.0)
-    assert_exact(Ray(rig, SOLVERS["static"], quantity))
+Posed = Callable[[], Rig]
+Rows = list[tuple[Posed, tuple[str, ...], tuple[str, ...]]]
+SMOOTH: Rows = [
+    (partial(squeezed, 4.0), ("static",), ("design", "stiffness", "drive")),
+    (partial(pushed, slowly=True), ("static",), ("design", "stiffness", "drive")),
+    (partial(pushed, slowly=False), LOOPS, QUANTITIES),
+    (shaken, DYNAMIC, ("design", "damping", "drive")),
+    (partial(shaken, recorded=True), DYNAMIC, ("drive",)),
+    (pulled, LOOPS, ("design", "drive")),
+]
+TOUCHING: Rows = [
+    (partial(squeezed, 9.0), ("static",), ("design", "stiffness", "contact", "drive")),
+    (partial(shaken, bias_deg=45.0), LOOPS, (*QUANTITIES, "contact")),
+]
+
+
+def each(rows: Rows) -> pytest.MarkDecorator:
+    cases = [(rig, s, q) for rig, solvers, quantities in rows for s in solvers for q in quantities]
+    return pytest.mark.parametrize(("posed", "solver", "quantity"), cases)
+
+
+@each(SMOOTH)
+def test_gradients_without_contact(posed: Posed, solver: str, quantity: str) -> None:
+    assert_exact(Ray(posed(), SOLVERS[solver], quantity))
 
 
 def test_equilibria_by_fronts() -> None:
@@ -226,59 +240,20 @@ def test_equilibria_by_fronts() -> None:
     assert_exact(Ray(rig, SOLVERS["static"], "design"))
 
 
-@pytest.mark.parametrize("quantity", ["design", "stiffness", "contact", "drive"])
-def test_equilibria_in_contact(quantity: str) -> None:
-    rig = squeezed(9.0)
-    ray = Ray(rig, SOLVERS["static"], quantity)
-    times = ray.solver.output_times
-    pattern = ray.in_contact(0.0, times)
-    assert pattern.any()
-    for step in TAYLOR_IN_CONTACT[quantity][0] * np.array([-1, 1]):
-        np.testing.assert_array_equal(ray.in_contact(step, times), pattern)
-    assert_exact_in_contact(ray)
-
-
-@pytest.mark.parametrize("quantity", ["design", "stiffness", "drive"])
-def test_equilibria_under_forces(quantity: str) -> None:
-    rig = pushed(slowly=True)
-    assert_exact(Ray(rig, SOLVERS["static"], quantity))
-
-
-@pytest.mark.parametrize("quantity", QUANTITIES)
-@pytest.mark.parametrize("solver", LOOPS)
-def test_motions_under_forces(solver: str, quantity: str) -> None:
-    rig = pushed(slowly=False)
-    assert_exact(Ray(rig, SOLVERS[solver], quantity))
-
-
 @pytest.mark.parametrize("quantity", ["density", "damping"])
 def test_equilibria_do_not_depend_on_inertia(quantity: str) -> None:
     rig = squeezed(4.0)
     assert Ray(rig, SOLVERS["static"], quantity).slope == 0.0
 
 
-@pytest.mark.parametrize("quantity", ["design", "damping", "drive"])
-@pytest.mark.parametrize("solver", DYNAMIC)
-def test_motions(solver: str, quantity: str) -> None:
-    rig = shaken()
-    assert_exact(Ray(rig, SOLVERS[solver], quantity))
-
-
-@pytest.mark.parametrize("solver", DYNAMIC)
-def test_motions_under_a_recorded_drive(solver: str) -> None:
-    rig = shaken(recorded=True)
-    assert_exact(Ray(rig, SOLVERS[solver], "drive"))
-
-
-@pytest.mark.parametrize("quantity", [*QUANTITIES, "contact"])
-@pytest.mark.parametrize("solver", LOOPS)
-def test_motions_in_contact(solver: str, quantity: str) -> None:
-    rig = shaken(bias_deg=45.0)
-    ray = Ray(rig, SOLVERS[solver], quantity)
-    pattern = ray.in_contact(0.0, EVERYWHERE)
+@each(TOUCHING)
+def test_gradients_in_contact(posed: Posed, solver: str, quantity: str) -> None:
+    ray = Ray(posed(), SOLVERS[solver], quantity)
+    times = ray.solver.output_times if solver == "static" else EVERYWHERE
+    pattern = ray.in_contact(0.0, times)
     assert pattern.any()
     for step in TAYLOR_IN_CONTACT[quantity][0] * np.array([-1, 1]):
-        np.testing.assert_array_equal(ray.in_contact(step, EVERYWHERE), pattern)
+        np.testing.assert_array_equal(ray.in_contact(step, times), pattern)
     assert_exact_in_contact(ray)
 
 
@@ -290,13 +265,6 @@ def test_motions_deep_in_contact(quantity: str) -> None:
     states = ray.motion(0.0, ray.solver)[0][0]
     assert rig.topology.smallest_void_angle(rig.values.void, states).min() < np.deg2rad(-13.5)
     assert ray.slope == pytest.approx(ray.difference(1e-7), rel=1e-3)
-
-
-@pytest.mark.parametrize("quantity", ["design", "drive"])
-@pytest.mark.parametrize("solver", ["implicit", "blanes_moan"])
-def test_polygons_of_any_kind(solver: str, quantity: str) -> None:
-    rig = pulled()
-    assert_exact(Ray(rig, SOLVERS[solver], quantity))
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

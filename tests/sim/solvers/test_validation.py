@@ -1,6 +1,7 @@
 """What a solve must not start from: each of these once went on without a sign."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ SOLVERS = pytest.mark.parametrize("kind", ["static", "implicit", "explicit"])
 
 def solver(rig: Rig, kind: str) -> Solver:
     if kind == "static":
-        return StaticSolver(rig.topology, np.array([0.0, 1.0]))
+        return StaticSolver(rig.topology, TIMES[::2])
     if kind == "implicit":
         return ImplicitSolver(rig.topology, TIMES, TIMES)
     return ExplicitSolver(rig.topology, TIMES[-1], 50, TIMES)
@@ -112,3 +113,35 @@ def test_states_with_units_in_one_another_are_told_apart(distance: float | None)
     states[1, 4, 0] = -9.0
     found = inadmissible(rig.topology, rig.values, states.reshape(3, -1))
     np.testing.assert_array_equal(found, [False, True, False])
+
+
+@pytest.mark.parametrize(
+    ("kind", "broken"),
+    [
+        *(("static", name) for name in ("drive", "law", "void", "arm")),
+        *product(("implicit", "explicit"), ("drive", "law", "void", "mass", "damping")),
+    ],
+)
+def test_nan_never_leaves(kind: str, broken: str) -> None:
+    rig = pulled(20.0)
+    values, drive = rig.values, rig.drive
+    if broken == "drive":
+        series = TimeSeries(TIMES[::2], np.array([[0.0] * 3, [np.nan] * 3, [0.0] * 3]))
+        drive = rig.driven_by(series)
+    else:
+        bad = np.array(getattr(values, broken))
+        bad.flat[20] = np.nan
+        values = values._replace(**{broken: bad})
+    with pytest.raises(SimulationError):
+        solve_case(solver(rig, kind), values, drive)
+
+
+@SOLVERS
+def test_what_cannot_be_reached_is_an_error_with_its_step_and_a_remedy(kind: str) -> None:
+    """Two held neighbours turned against each other beyond the barrier of the void between."""
+    closing = TimeSeries(TIMES[[0, -1]], np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 3.0]]))
+    rig = Rig(rotating_squares(3), np.array([3]), np.array([4]), closing)
+    with pytest.raises(SimulationError, match="try ") as failure:
+        solve_case(solver(rig, kind), rig.values, rig.drive)
+    assert failure.value.step is not None
+    assert kind != "implicit" or failure.value.unit is not None

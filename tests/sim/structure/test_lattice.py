@@ -63,11 +63,6 @@ def test_regular_units_face_each_neighbour(named: Lattice, joined: int, n_ligame
     np.testing.assert_allclose(named.index @ [1, 6], np.arange(30))
 
 
-def test_a_polygon_without_corners_has_no_area() -> None:
-    with pytest.raises(ValueError, match="a polygon of 0 corners has no area"):
-        listed([()], [], 15.0)
-
-
 def test_rectangular_lattice() -> None:
     lattice = quads(4, 3, 10.0, 1.5, 0.3)
     assert (lattice.n_units, lattice.n_ligaments) == (12, 3 * 3 + 4 * 2)
@@ -83,3 +78,5 @@ def test_listed_polygons_may_be_drawn_either_way_round() -> None:
     for drawn in (square, square[::-1]):
         x, y = listed([drawn], [], 2.0).vertices.T
         assert np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2 == 4.0
+    with pytest.raises(ValueError, match="a polygon of 0 corners has no area"):
+        listed([()], [], 15.0)

@@ -123,14 +123,6 @@ def test_deep_contact_takes_no_shorter_steps() -> None:
     np.testing.assert_allclose(u, fine, atol=6e-2 * np.abs(fine).max())
 
 
-def test_what_cannot_be_integrated_is_an_error_with_its_step_and_a_remedy() -> None:
-    closing = TimeSeries(np.array([0.0, 0.012]), np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 3.0]]))
-    rig = Rig(rotating_squares(3), np.array([3]), np.array([4]), closing)
-    with pytest.raises(SimulationError, match="try ") as failure:
-        solver_for(rig, 200).forward(rig.values, rig.drive)
-    assert failure.value.step is not None
-
-
 def test_a_run_that_would_fill_the_memory_is_refused_before_it_begins() -> None:
     rig = shaken(1.0)
     stiff = rig.values._replace(law=rig.values.law * 1e14)

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from benchmarks.scenes import BARRIER, CUTOFF
-from sim.core import Floats, SimulationError
+from sim.core import Floats
 from sim.quasistatics import StaticSolver
-from sim.solvers import Harmonic, LinearRamp, TimeSeries, solve_case
+from sim.solvers import LinearRamp, TimeSeries, solve_case
 from sim.time_integration import ImplicitSolver
 from sim.time_integration.coefficients import ESDIRK3
-from tests.sim.structures import NONE, Rig, mixed_polygons, rotating_squares
+from tests.sim.structures import NONE, Rig, rotating_squares
 from tests.sim.time_integration.pulse import (
     CORNERS,
     DURATION,
@@ -103,18 +103,6 @@ def test_a_slow_drive_follows_the_equilibria() -> None:
     np.testing.assert_allclose(dynamic, static, atol=2e-3)
 
 
-def test_polygons_of_any_kind() -> None:
-    motion = Harmonic(0.5, 60.0, 1.0, rise=0.002, delay=0.005)
-    rig = Rig(mixed_polygons(), np.array([0]), np.array([7]), motion)
-
-    def run(n_steps: int) -> Floats:
-        times = np.linspace(0.0, 0.02, n_steps + 1)
-        solver = ImplicitSolver(rig.topology, times, times[-1:], tolerance=1e-6)
-        return solver.forward(rig.values, rig.drive)[0]
-
-    np.testing.assert_allclose(run(200), run(400), atol=1e-2 * np.abs(run(400)).max())
-
-
 def test_turning_around_several_times() -> None:
     """A free structure whose middle is turned by 9 rad follows it as a rigid body."""
     times = np.linspace(0.0, 4.0, 801)
@@ -127,17 +115,6 @@ def test_turning_around_several_times() -> None:
     offset = rig.lattice.site - rig.lattice.site[4]
     c, s = np.cos(9.0), np.sin(9.0)
     np.testing.assert_allclose(end[:, :2], offset @ [[c, s], [-s, c]] - offset, atol=0.1)
-
-
-def test_what_cannot_be_integrated_is_an_error_with_its_step_and_a_remedy() -> None:
-    """Two held neighbours turned against each other beyond the barrier."""
-    closing = TimeSeries(np.array([0.0, 1.0]), np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 3.0]]))
-    rig = Rig(rotating_squares(3), np.array([3]), np.array([4]), closing)
-    times = np.linspace(0.0, 1.0, 41)
-    with pytest.raises(SimulationError, match="try ") as failure:
-        ImplicitSolver(rig.topology, times, times).forward(rig.values, rig.drive)
-    assert failure.value.step is not None
-    assert failure.value.unit is not None
 
 
 def test_asked_times_do_not_change_the_steps() -> None:

@@ -1,24 +1,17 @@
-import jax
 import numpy as np
 import pytest
 
-from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
+from benchmarks.scenes import BARRIER, CUTOFF
 from sim.core import Floats, SimulationError
-from sim.structure import ConcreteParameters, Lattice, VoidAngleContact, kagome, parameters, shape
+from sim.structure import Lattice, VoidAngleContact, kagome
 from sim.vibration import UnitCell, bands, brillouin_path, cell_of, strained
-from tests.sim.structures import rotating_squares
+from tests.sim.structures import at_rest, rotating_squares
 
 NO_LOOSE = np.zeros((2, 2))
 
 
 def made(lattice: Lattice, period: tuple[int, int]) -> UnitCell:
-    values = jax.jit(lambda x: parameters(lattice, shape(lattice, x), MATERIAL))(lattice.vertices)
-    return cell_of(
-        lattice,
-        VoidAngleContact(BARRIER, CUTOFF),
-        ConcreteParameters(*map(np.asarray, values)),
-        period,
-    )
+    return cell_of(lattice, VoidAngleContact(BARRIER, CUTOFF), at_rest(lattice), period)
 
 
 LATTICES = [

@@ -54,12 +54,8 @@ def test_a_floating_structure_has_three_rigid_motions(rig: Rig) -> None:
     found = modes(linearised(floating, rig.values), 4).frequency
     assert np.abs(found[:3]).max() < 1e-3
     assert found[3] > 1.0
-
-
-def test_so_many_modes_there_are_not(rig: Rig) -> None:
-    made = linearised(rig.topology, rig.values)
     with pytest.raises(ValueError, match="degrees of freedom"):
-        modes(made, len(made.free))
+        modes(linearised(rig.topology, rig.values), len(rig.topology.free_dofs))
 
 
 def test_a_small_vibration_in_time_settles_to_the_linear_one(rig: Rig) -> None:
