@@ -54,12 +54,6 @@ def test_every_unit_is_one_that_programs_know(kind: Kind) -> None:
                 assert not cf_units.Unit(spelt.strip()).is_unknown(), name
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_plain_xarray_opens_it(kind: Kind, tmp_path: Path) -> None:
-    with xr.open_dataset(written(kind, tmp_path)) as opened:
-        xr.testing.assert_equal(opened.load(), sample(kind))
-
-
 OLD = {"degree": "deg", "1/mm (columns 0, 1), 1 (column 2)": "px, mm"}
 OLD["constraint_units (constraint)"] = "as in constraint_units"
 FIRST: tuple[Kind, ...] = KINDS[: KINDS.index("comparison")]

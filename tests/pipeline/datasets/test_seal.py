@@ -3,12 +3,12 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
-import xarray as xr
 
 from pipeline.datasets import seal
 from pipeline.datasets.files import read, write
 from pipeline.runtime import UserError
 from tests.pipeline.samples import sample
+from tests.tables import refused
 
 
 @pytest.fixture
@@ -38,19 +38,13 @@ def test_what_other_software_changed_is_taken_where_it_says_so(sweep: Path) -> N
     assert float(read(sweep, "sweep")["loss"][0]) == 7.0
 
 
-def test_other_software_reads_what_is_sealed(sweep: Path) -> None:
-    with xr.open_dataset(sweep, engine="netcdf4") as data:
-        xr.testing.assert_equal(data.load(), sample("sweep"))
-
-
 def test_a_small_file_cannot_claim_all_memory(tmp_path: Path) -> None:
     path = tmp_path / "huge.nc"
     with netCDF4.Dataset(path, "w") as made:
         made.createDimension("unit", 10**6)
         made.createVariable("vertices", "f8", ("unit", "unit"), chunksizes=(1000, 1000))
-    with pytest.raises(UserError, match="it would fill 7629394 MiB") as caught:
+    with refused("it would fill 7629394 MiB", file=path):
         read(path, "design")
-    assert caught.value.file == str(path)
 
 
 @pytest.mark.parametrize("version", ["2", [1, 2], 2.5])

@@ -11,6 +11,7 @@ from pipeline.problem.identity import canonical_json
 from pipeline.runtime import UserError
 from sim.scene import Scene, simulate
 from tests.pipeline import static
+from tests.tables import cases
 
 PUSH = "{ kind: force, units: right, amplitude: 0.5 N, direction: 180 deg, free: [uy] }"
 TURN = "{ kind: rotation, units: { units: [[2, 0]] }, amplitude: 10 deg }"
@@ -70,6 +71,7 @@ def test_several_drives_act_at_once(tmp_path: Path) -> None:
 def test_directions_of_one_are_load_cases_of_all(tmp_path: Path) -> None:
     push = PUSH.replace("direction: 180 deg, free: [uy]", "directions: [180 deg, 90 deg]")
     asked = load(written(tmp_path, f"drives:\n  - {push}\n  - {TURN}"))
+    assert from_canonical(canonical_json(asked)) == asked
     scene = scene_of(asked, tmp_path)
     assert len(scene.loads.cases) == 2
     ends = [case.forces(np.array([1.0]))[0, -1, :2] for case in scene.loads.cases]
@@ -95,26 +97,7 @@ def test_a_driven_edge_may_slide(tmp_path: Path) -> None:
     np.testing.assert_allclose(free[-1, RIGHT, 0], 3.0)
 
 
-def test_they_are_read_back_from_a_dataset(tmp_path: Path) -> None:
-    asked = load(written(tmp_path, f"drives:\n  - {PUSH}\n  - {TURN}"))
-    assert from_canonical(canonical_json(asked)) == asked
-
-
-@pytest.mark.parametrize(
-    ("drive", "words"),
-    [
-        (f"drive: [{PUSH}]", ("keys and values are wanted here", "a list under `drives`")),
-        (f"drive: {PUSH.replace('N,', 'mm,')}", ("not that of a force", "drive.amplitude")),
-        (f"drive: {PUSH.replace('[uy]', '[ux]')}", ("acts on ux, which is to be free",)),
-        (f"drives: [{PUSH}, {PUSH}]", ("is driven twice", "drives[1].units")),
-        (f"drive: {PUSH}\ndrives: [{TURN}]", ("exclude each other",)),
-        (
-            f"drives: [{PUSH}, {TURN.replace('deg }', 'deg, frequency: 2 Hz }')}]",
-            ("is a slow load", "a course in time"),
-        ),
-        (f"drive: {PUSH.replace('free', 'delay: 1 s, free')}", ("has no delay",)),
-    ],
-)
+@cases("posing", "drive, words")
 def test_what_has_no_meaning_is_refused(tmp_path: Path, drive: str, words: tuple[str, ...]) -> None:
     with pytest.raises(UserError) as told:
         load(written(tmp_path, drive))

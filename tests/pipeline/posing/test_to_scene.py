@@ -9,17 +9,19 @@ from pipeline.__main__ import run_stage
 from pipeline.posing import scene_of
 from pipeline.posing.to_scene import contact_laws
 from pipeline.problem.reading import load
-from pipeline.runtime import UserError
 from sim.structure import VoidAngleContact
 from tests.pipeline.static import SHIELD, write
+from tests.tables import cases, refused
 
-SERIES = "drive: { kind: time_series, units: right, file: push.csv }\n"
-WRONG = {
-    "beyond the lattice": ("amplitude: 9 mm", "amplitude: 400 mm", "drive.amplitude"),
-    "1e10": ("amplitude: 9 mm", "amplitude: 1e10 mm", "drive.amplitude"),
-    "no supports": ("supports:\n  - units: left\n", "supports: []\n", "supports"),
-    "no length": ("ligament_length: 2.25 mm", "ligament_length: 1e-9 mm", "lattice"),
-}
+SERIES = "{ kind: time_series, units: right, file: push.csv }"
+
+
+def with_drive(folder: Path, drive: str) -> Path:
+    path = write(folder, SHIELD, amplitude=9)
+    text = path.read_text(encoding="utf-8")
+    ramp = text[text.index("drive:") : text.index("horizon:")]
+    path.write_text(text.replace(ramp, f"drive: {drive}\n"), encoding="utf-8")
+    return path
 
 
 def test_the_law_of_contact_is_that_of_the_problem(fig2: Path) -> None:
@@ -37,7 +39,7 @@ def design(path: Path, out: Path, capfd: pytest.CaptureFixture[str]) -> str:
     return told
 
 
-@pytest.mark.parametrize(("old", "new", "key"), WRONG.values(), ids=WRONG)
+@cases("posing", "old, new, key")
 def test_the_file_the_key_and_a_remedy_are_told(
     old: str, new: str, key: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -53,32 +55,17 @@ def test_the_file_the_key_and_a_remedy_are_told(
 
 @pytest.mark.parametrize("drive", ["[1, 2]", "3", "[]"])
 def test_a_drive_that_is_no_section_is_told_in_words(drive: str, tmp_path: Path) -> None:
-    path = write(tmp_path, SHIELD, amplitude=9)
-    text = path.read_text(encoding="utf-8")
-    ramp = text[text.index("drive:") : text.index("horizon:")]
-    path.write_text(text.replace(ramp, f"drive: {drive}\n"), encoding="utf-8")
-    with pytest.raises(UserError, match="keys and values are wanted here") as caught:
+    path = with_drive(tmp_path, drive)
+    with refused("keys and values are wanted here", "drive"):
         load(path)
-    assert caught.value.key == "drive"
 
 
-@pytest.mark.parametrize(
-    ("rows", "what"),
-    [
-        ("0,0\n0.6,1\n", "known from 0 to 0.6 s"),
-        ("0,1\n2,1\n", "starts with a jump"),
-        ("0,0\n1,1\n0.5,2\n", "ascending times"),
-        ("0,0\n2,900\n", "further than the lattice"),
-    ],
-)
+@cases("posing", "rows, what")
 def test_a_measured_drive_that_cannot_be_meant(
     rows: str, what: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    path = write(tmp_path, SHIELD, amplitude=9)
-    text = path.read_text(encoding="utf-8")
-    ramp = text[text.index("drive:") : text.index("horizon:")]
-    moved = text.replace(ramp, SERIES).replace(", steps: 4", ", samples: 5")
-    path.write_text(moved, encoding="utf-8")
+    path = with_drive(tmp_path, SERIES)
+    path.write_text(path.read_text(encoding="utf-8").replace(", steps: 4", ", samples: 5"))
     series = "".join(f"{row},0,0\n" for row in rows.splitlines())
     (tmp_path / "push.csv").write_text(f"time (s),ux (mm),uy (mm),theta (rad)\n{series}")
     assert what in design(path, tmp_path / "design.nc", capfd)
