@@ -34,14 +34,10 @@ STIFFNESS = ["axial_stiffness", "shear_stiffness", "bending_stiffness"]
 
 def force_sets(noise: str = "0.02 N", points: int = 16) -> list[dict[str, Any]]:
     """Tension, compression and shear of a small lattice."""
+    virtual = {"points": points, "noise": noise}
+    kind = {"kind": "force_displacement", "lattice": LATTICE}
     return [
-        {
-            "kind": "force_displacement",
-            "name": test,
-            "test": test,
-            "lattice": LATTICE,
-            "virtual": {"end": end, "points": points, "noise": noise},
-        }
+        {**kind, "name": test, "test": test, "virtual": {"end": end, **virtual}}
         for test, end in ENDS.items()
     ]
 

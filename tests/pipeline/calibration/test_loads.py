@@ -19,6 +19,7 @@ from tests.pipeline.calibration.specimens import (
     synthesised,
     written,
 )
+from tests.tables import cases
 
 SPECIMENS = ROOT / "experiments/calibration/specimens"
 ERROR = {"displacement": "0.005 mm", "rotation": "0.02 deg"}
@@ -31,6 +32,7 @@ CONTACT = {
 }
 
 START = TRUTH | {"shear_stiffness": "1.1 N/mm", "bending_stiffness": "1.6 N mm/rad"}
+Output = pytest.CaptureFixture[str]
 READINGS = {"displacement": units.LENGTH, "force": units.FORCE}
 WANTED = ["shear_stiffness", "bending_stiffness"]
 
@@ -89,20 +91,9 @@ def track(**changed: Any) -> dict[str, Any]:  # noqa: ANN401
     }
 
 
-@pytest.mark.parametrize(
-    ("problem", "changed", "told"),
-    [
-        ("squeezed.yaml", {"virtual": {"rate": "6 Hz", "noise": ERROR}}, "has no readings"),
-        ("shaken.yaml", {"virtual": FAST}, "the cell feels the inertia of the grips"),
-        ("squeezed.yaml", {"case": 3}, "the problem has 1 load cases"),
-    ],
-)
+@cases("calibration", "problem, changed, told")
 def test_loads_that_are_refused(
-    problem: str,
-    changed: dict[str, Any],
-    told: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    problem: str, changed: dict[str, Any], told: str, tmp_path: Path, capsys: Output
 ) -> None:
     shutil.copy(SPECIMENS / problem, tmp_path)
     asked = described([track(problem=problem, **changed)], WANTED, material=START)

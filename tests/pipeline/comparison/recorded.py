@@ -19,15 +19,7 @@ FORCE = 0.02
 def track(
     design: xr.Dataset, response: xr.Dataset, structure: str, time: np.ndarray, at: np.ndarray
 ) -> xr.Dataset:
-    """A track of the first load case.
-
-    Args:
-        design: of the study.
-        response: of the study.
-        structure: which was filmed.
-        time: (frames,) of the frames, s.
-        at: (frames,) time of the response that each shows, s.
-    """
+    """A track of the first case; frames of times (frames,), s, show the response at others, s."""
     shown = response.sel(structure=structure).isel(case=0)
     true = interpolate_response(shown, at)
     motion = true.displacement

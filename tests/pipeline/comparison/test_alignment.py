@@ -83,9 +83,8 @@ def test_a_steady_vibration_is_said_to_be_ambiguous() -> None:
 def test_a_drive_of_another_frequency_cannot_be_aligned() -> None:
     time = np.arange(90) / RATE
     other = SampledMotion(time, sine(2.7 * time))
-    with pytest.raises(UserError, match="cannot be aligned") as caught:
+    with pytest.raises(UserError, match=r"cannot be aligned[\s\S]*correlation"):
         find_lag(other, NOMINAL)
-    assert "correlation" in str(caught.value)
 
 
 def test_too_few_frames_are_refused() -> None:
@@ -112,11 +111,6 @@ def test_loads_beyond_the_nominal_ones_have_no_time() -> None:
     assert np.isnan(found[22:]).all()
 
 
-def test_a_rest_belongs_to_the_way_before_it() -> None:
-    held = np.concatenate([np.zeros(20), np.linspace(0, 9, 40), np.full(20, 9.0)])
-    assert (find_branches(held) == LOADING).all()
-
-
 def test_a_drive_that_does_not_move_along_is_refused() -> None:
     ramp = SampledMotion(TIMES, 10 * TIMES[:, None])
     with pytest.raises(UserError, match="cannot be aligned"):
@@ -130,7 +124,9 @@ def test_the_direction_of_a_drive_is_told() -> None:
     assert drive_turn(line * [np.cos(0.1), np.sin(0.1)], line * [1.0, 0.0]) == pytest.approx(0.1)
 
 
-def test_branches_follow_a_load_that_grows_again() -> None:
+def test_branches_follow_a_load_that_rests_and_grows_again() -> None:
+    held = np.concatenate([np.zeros(20), np.linspace(0, 9, 40), np.full(20, 9.0)])
+    assert (find_branches(held) == LOADING).all()
     up, rest = np.linspace(0.0, 1.0, 100), np.ones(40)
     found = find_branches(np.concatenate([up, rest, up[::-1], up]))
     assert (found[10:130] == LOADING).all()

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.comparison import metrics
+from pipeline.comparison import compute_reduction, metrics
 from pipeline.comparison.metrics import (
     METRICS,
     Pair,
@@ -68,10 +68,8 @@ def test_gaps_are_left_out_and_nothing_at_all_gives_no_number() -> None:
     np.testing.assert_allclose(found[:SHIFT], compute_metrics(whole)[:SHIFT], rtol=0.05)
     empty = compute_metrics(whole._replace(measured=np.full_like(whole.measured, np.nan)))
     assert np.isnan(empty).all()
-    nothing = estimate_metrics(
-        whole.taken(np.arange(FRAMES), np.arange(0)), None, np.random.default_rng(0)
-    )
-    assert np.isnan(nothing).all()
+    none = whole.taken(np.arange(FRAMES), np.arange(0))
+    assert np.isnan(estimate_metrics(none, None, np.random.default_rng(0))).all()
 
 
 def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
@@ -125,3 +123,15 @@ def test_an_interval_is_as_wide_as_residuals_that_remember_make_it() -> None:
         widths.append(float(high[0] - low[0]))
     wanted = 2 * 1.96 * np.sqrt((1 + kept) / (1 - kept) / frames)
     assert 0.6 < np.median(widths) / wanted < 1.2
+
+
+def test_the_interval_of_a_reduction_is_that_of_drawn_quantities() -> None:
+    random = np.random.default_rng(0)
+    before, after = (random.normal(mean, 0.05, 20000) for mean in (5.2, 1.9))
+    ends = 1.96 * 0.05 * np.array([0.0, -1.0, 1.0])
+    value, *found = compute_reduction(5.2 + ends, 1.9 + ends)
+    drawn = np.quantile(1 - after / before, [0.025, 0.975])
+    np.testing.assert_allclose(found, drawn, atol=1e-3)
+    assert value == 1 - 1.9 / 5.2
+    one_sided = compute_reduction(np.array([2.0, 2.0, 2.0]), np.array([1.0, 1.0, 1.2]))
+    np.testing.assert_array_equal(one_sided, [0.5, 0.4, 0.5])

@@ -60,11 +60,8 @@ def test_a_path_of_equilibria_is_found_again(pressed: Scene) -> None:
 def test_a_motion_in_time_is_found_again() -> None:
     scene = scene_of(problem.load(FIG2 / "problem.yaml", "quick"), FIG2)
     track, motion = tracked(scene, 0.5, 61)
-    made = simulate_redriven(
-        PosedStructure(scene, scene.lattice.vertices),
-        filter_held_motion(track, scene),
-        track["time"].values,
-    )
+    structure = PosedStructure(scene, scene.lattice.vertices)
+    made = simulate_redriven(structure, filter_held_motion(track, scene), track["time"].values)
     share = np.sqrt(np.mean((made.displacement - motion) ** 2) / np.mean(motion**2))
     assert share < 0.02
 
@@ -107,9 +104,8 @@ def test_the_filter_departs_by_the_uncertainty_and_keeps_a_jump_of_speed() -> No
 
 def test_a_path_that_cannot_be_followed_is_kept_so_far(pressed: Scene) -> None:
     track, _ = tracked(pressed, 1.0, 20)
-    track["displacement"][:, pressed.loads.driven[0], 2] += np.linspace(
-        0, 3, 20
-    )  # into its neighbour
+    into_its_neighbour = np.linspace(0, 3, 20)
+    track["displacement"][:, pressed.loads.driven[0], 2] += into_its_neighbour
     structure = PosedStructure(pressed, pressed.lattice.vertices)
     made = simulate_redriven(structure, filter_held_motion(track, pressed), track["time"].values)
     assert "no equilibrium" in (made.failure or "")

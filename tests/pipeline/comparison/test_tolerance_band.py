@@ -12,6 +12,7 @@ from pipeline.problem import Problem
 from pipeline.problem.sections import Tolerances
 from pipeline.problem.sections.prediction import Assembly
 from tests.pipeline import static
+from tests.tables import cases
 
 SIGMA = np.array([0.01, 0.01, 0.001])
 SIZES = "geometry: 0.03, ligaments: 0.1, stiffness: 0.05"
@@ -88,14 +89,7 @@ def test_limits_hold_the_next_draw() -> None:
     assert abs(middle.mean()) < 0.01
 
 
-@pytest.mark.parametrize(
-    ("more", "expected"),
-    [
-        ("", {"geometry": 0.01, "ligaments": 0.05}),
-        ("robustness: { geometry: [0.05, 0.03] }\n", {"geometry": 0.03, "ligaments": 0.1}),
-        ("prediction: { geometry: 0.02 }\n", {"geometry": 0.02, "ligaments": 0.05}),
-    ],
-)
+@cases("comparison", "more, expected")
 def test_sizes_are_those_given_or_tried_or_usual(
     tmp_path: Path, more: str, expected: dict[str, float]
 ) -> None:

@@ -49,12 +49,7 @@ def _flags(values: np.ndarray, meanings: str) -> tuple[str, np.ndarray, dict[str
 
 
 def write(folder: Path, parameters: Mapping[str, object] | None = None) -> Problem:
-    """Write the package into a new folder; returns the problem that it was made with.
-
-    Args:
-        folder: of the package.
-        parameters: of fabrication, where they are not the defaults.
-    """
+    """Writes the package into a new folder, with parameters other than the defaults."""
     settings = Fabrication.model_validate(parameters or {}, context=SIM_UNITS)
     posed = problem.load(PROBLEM).model_copy(update={"fabrication": settings})
     net = network(design(), "cloaked")

@@ -82,30 +82,11 @@ def _unit(
     for vertex, ligament in ends:
         slot, tip, inwards = slotted(corners, vertex, depth)
         outline = Polygon(outline.difference(slot).difference(tip))
-        slots.append(
-            Slot(
-                vertex,
-                ligament,
-                corners[vertex],
-                inwards,
-                depth,
-                ASKED.slot_width,
-                TRUNCATION,
-                wall=1.0,
-            )
-        )
+        place = vertex, ligament, corners[vertex], inwards
+        slots.append(Slot(*place, depth, ASKED.slot_width, TRUNCATION, wall=1.0))
     centre = corners.mean(axis=0)
     letters = (np.add(centre, [[-1.0, -1.5], [-1.0, 1.5], [0.5, 1.5]]),)
     arrow = (np.add(centre, [[1.5, -1.0], [1.5, 1.0]]),)
-    return Unit(
-        number,
-        label,
-        *index,
-        design,
-        outline,
-        tuple(slots),
-        letters,
-        arrow,
-        (Circle((float(centre[0]), float(centre[1])), 2.0),),
-        ASKED.thickness,
-    )
+    dots = (Circle((float(centre[0]), float(centre[1])), 2.0),)
+    marks = letters, arrow, dots
+    return Unit(number, label, *index, design, outline, tuple(slots), *marks, ASKED.thickness)

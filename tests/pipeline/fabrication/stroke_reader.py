@@ -64,11 +64,7 @@ def _segments(strokes: Sequence[Floats]) -> Floats:
 
 
 def _ballots(drawn: Floats, known: Floats) -> Iterator[tuple[float, float]]:
-    """Yields heights and turns of the text, those with most votes first.
-
-    A stroke that a slot cuts votes for the right turn still, for the height only a whole one does:
-    where all are cut, letters are small.
-    """
+    """Yields heights and turns of the text, those with most votes first; of cut strokes, turns."""
     ours, theirs = (pair[:, 1] - pair[:, 0] for pair in (drawn, known))
     ratio = (ours[:, 0] + 1j * ours[:, 1])[:, None] / (theirs[:, 0] + 1j * theirs[:, 1])[None]
     votes = np.concatenate([ratio.ravel(), -ratio.ravel()])  # strokes may be drawn backwards
@@ -109,10 +105,7 @@ def _read(
 def _spots(
     letter: Sequence[Floats], drawn: Floats, whole: shapely.Geometry
 ) -> tuple[Floats, Floats]:
-    """Finds where a letter may be (n, 2), and how much of it is there (n,); the best places.
-
-    A stroke of the letter, or what a slot leaves of it, is drawn from its start or to its end.
-    """
+    """Finds where a letter may be (n, 2), and how much of it is there (n,); the best places."""
     own = _segments(letter)
     both = np.concatenate([drawn, drawn[:, ::-1]])
     ours, theirs = both[:, 1] - both[:, 0], own[:, 1] - own[:, 0]
@@ -130,10 +123,7 @@ def _spots(
 
 
 def _in_order(places: Sequence[Floats], weights: Sequence[Floats]) -> tuple[list[int], float]:
-    """Finds the heaviest choice of one place for each letter, on a line or below each other.
-
-    Places (n, 2) are upright, in heights; where no choice reads, the weight is zero.
-    """
+    """Finds the heaviest choice of a place (n, 2) for each letter, on a line or one by one."""
     choices: list[tuple[list[int], float]] = [([], 0.0)]
     for below in (False, True):
         sums, before = weights[0], []

@@ -88,9 +88,8 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     }
     write_bill(tmp_path / "bom.csv", specimen, ASKED, DENSITY, contents, PRINTS, 0.62)
     found = read_bill(tmp_path / "bom.csv")
-    assert [row["id"] for row in found if row["item"] == "unit"] == [
-        unit.label for unit in specimen.units
-    ]
+    units = [row["id"] for row in found if row["item"] == "unit"]
+    assert units == [unit.label for unit in specimen.units]
     first = found[0]
     assert first["note"] == "column 1 row 1; slots 3 3 mm deep; walls from 1.00 mm"
     assert specimen.thin == {}
@@ -105,9 +104,8 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     files = [(row["item"], row["count"]) for row in found if "/" in row["id"]]
     assert files == [("sheet", "6"), ("sheet", "1"), ("plate", "1")]  # units are cut in six layers
     total = next(row for row in found if row["item"] == "total")
-    assert float(total["mass_g"]) == pytest.approx(
-        sum(float(row["mass_g"]) for row in found if row["item"] == "unit"), abs=1e-3
-    )
+    masses = [float(row["mass_g"]) for row in found if row["item"] == "unit"]
+    assert float(total["mass_g"]) == pytest.approx(sum(masses), abs=1e-3)
     assert "print 62 % full" in total["note"]
     plate = next(row for row in found if row["item"] == "plate")
     assert plate["note"] == "2 parts; about 1 h 05 min, 2.0 m or 6 g"

@@ -11,6 +11,7 @@ from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.datasets.tables import Kind
 from tests.pipeline.fabrication import built
+from tests.tables import tables
 
 Edit = Callable[[Path], None]
 
@@ -37,52 +38,13 @@ def overlapping(folder: Path) -> None:
     design.to_netcdf(folder / "design.nc")
 
 
-MISTAKES: dict[str, tuple[Edit, tuple[str, ...]]] = {
-    "overlap": (overlapping, ("the units A1 and B1 overlap", "constraints.gap")),
-    "slot cuts through": (
-        parameters(minimum_wall="4 mm", slots={"thicken": "0 mm"}),
-        ("is too slender for slots", "fabrication.minimum_wall"),
-    ),
-    "small bed": (
-        parameters(print={"bed": ["18 mm", "18 mm"], "margin": "5 mm"}),
-        ("does not fit on a bed", "fabrication.print.bed"),
-    ),
-    "small sheet": (
-        parameters(laser={"sheet": ["20 mm", "20 mm"]}),
-        ("does not fit on a sheet", "fabrication.laser.sheet"),
-    ),
-    "strips": (
-        parameters(shims={"strips": True}),
-        ("a strip cannot go on from one to the next", "fabrication.shims.strips", "tabs hold"),
-    ),
-    "wide tabs": (
-        parameters(shims={"tabs": {"width": "0.9 mm"}}),
-        ("do not stand within the slots", "fabrication.shims.tabs.width", "at most 0.85 mm"),
-    ),
-    "negative kerf": (parameters(laser={"kerf": "-0.1 mm"}), ("fabrication.laser.kerf",)),
-    "wide kerf": (
-        parameters(laser={"kerf": "0.5 mm"}),
-        ("a kerf of 0.5 mm closes a slot", "fabrication.laser.kerf"),
-    ),
-    "deep letters": (
-        parameters(labels={"depth": "3 mm"}, thickness="5 mm"),
-        ("more than half of the thickness", "fabrication.labels.depth", "within 2.5 mm"),
-    ),
-    "first layer": (
-        parameters(print={"first_layer_inset": "0.5 mm"}),
-        ("half of the thinnest wall", "fabrication.print.first_layer_inset"),
-    ),
-    "coupon": (parameters(coupon=["4 mm"]), ("slots wider than 8 mm", "fabrication.coupon")),
-    "bolt": (
-        parameters(fixture={"hole": "12 mm"}),
-        ("leaves no rim on a pad of 15 mm", "fabrication.fixture.hole"),
-    ),
-    "loose pocket": (
-        parameters(fixture={"clearance": "2 mm"}),
-        ("holds no unit", "fabrication.fixture.clearance"),
-    ),
-    "material": (parameters(material="wood"), ("fabrication.material", "PLA")),
-    "cut short": (cut_short, ("design.nc",)),
+BROKEN: dict[str, tuple[Edit, list[str]]] = {
+    "overlap": (overlapping, ["the units A1 and B1 overlap", "constraints.gap"]),
+    "cut short": (cut_short, ["design.nc"]),
+}
+MISTAKES = BROKEN | {
+    name: (parameters(**values), told)
+    for name, (values, told) in tables("fabrication")["mistakes"].items()
 }
 
 

@@ -69,8 +69,10 @@ def told(mesh: Mesh, path: Path) -> list[str]:
     return [fault.what for fault in check_solid(read_stl(write_stl(path, *mesh)))]
 
 
-def test_a_right_mesh_passes(tmp_path: Path) -> None:
+def test_a_right_mesh_outline_and_plate_pass(tmp_path: Path) -> None:
     assert told(prism(unit().outline), tmp_path / "B1.stl") == []
+    assert faults_of(unit().outline) == []
+    assert plate_faults(write_3mf(tmp_path / "plate.3mf", *plate())) == []
 
 
 @pytest.mark.parametrize("name", DAMAGES)
@@ -158,10 +160,6 @@ def faults_of(made: Polygon) -> list[str]:
     return [f"{fault.part}: {fault.what}" for fault in check_section(shape, ASKED)]
 
 
-def test_a_right_outline_passes() -> None:
-    assert faults_of(unit().outline) == []
-
-
 @pytest.mark.parametrize("name", OUTLINES)
 def test_a_damaged_outline_is_caught(name: str) -> None:
     damage, expected = OUTLINES[name]
@@ -177,10 +175,6 @@ def plate() -> tuple[dict[str, Mesh], dict[str, tuple[float, float]]]:
 
 def plate_faults(path: Path) -> list[str]:
     return [f"{fault.part}: {fault.what}" for fault in check_plate(read_3mf(path), PRINT)]
-
-
-def test_a_right_plate_passes(tmp_path: Path) -> None:
-    assert plate_faults(write_3mf(tmp_path / "plate.3mf", *plate())) == []
 
 
 @pytest.mark.parametrize(
@@ -200,26 +194,19 @@ def test_a_misplaced_part_is_caught(
     assert any(words.startswith(expected) for words in found), found
 
 
-def test_an_object_without_a_name_is_caught(tmp_path: Path) -> None:
-    path = write_3mf(tmp_path / "plate.3mf", {"": prism(unit().outline)}, {"": (30.0, 30.0)})
-    assert plate_faults(path) == ["part : an object without a name"]
-
-
 def test_a_broken_object_is_caught_on_its_plate(tmp_path: Path) -> None:
     bodies, places = plate()
     bodies["C1"] = without_a_face(bodies["C1"])
     found = plate_faults(write_3mf(tmp_path / "plate.3mf", bodies, places))
     assert found == ["part C1: its surface has holes"]
+    path = write_3mf(tmp_path / "plate.3mf", {"": prism(unit().outline)}, {"": (30.0, 30.0)})
+    assert plate_faults(path) == ["part : an object without a name"]
 
 
-def test_other_units_than_millimetres_are_refused(tmp_path: Path) -> None:
+def test_half_a_3mf_and_other_units_than_millimetres_are_refused(tmp_path: Path) -> None:
     path = write_3mf(tmp_path / "plate.3mf", *plate(), unit="inch")
     with pytest.raises(UserError, match="not millimeter"):
         read_3mf(path)
-
-
-def test_half_a_3mf_is_refused(tmp_path: Path) -> None:
-    path = write_3mf(tmp_path / "plate.3mf", *plate())
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(UserError, match="cannot be read back"):
         read_3mf(path)

@@ -23,11 +23,6 @@ THIN = Fault(
 )
 
 
-def test_no_fault_stops_nothing(tmp_path: Path) -> None:
-    stop([], tmp_path / "faults")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_fault_names_the_unit_the_parameter_and_the_picture(tmp_path: Path) -> None:
     with pytest.raises(UserError) as raised:
         stop([THIN], tmp_path / "faults")
@@ -45,16 +40,13 @@ def test_a_fault_names_the_unit_the_parameter_and_the_picture(tmp_path: Path) ->
 
 def test_many_faults_make_one_message_and_few_pictures(tmp_path: Path) -> None:
     faults = [replace(THIN, part=f"unit A{n}", spot=Point(n, n)) for n in range(1, 21)]
-    with pytest.raises(UserError) as raised:
-        stop(faults, tmp_path)
-    assert "(20 faults in all: unit A1, unit A2, unit A3, unit A4, unit A5, ...)" in str(
-        raised.value
-    )
-    assert len(list(tmp_path.glob("*.png"))) == PICTURES
-
-
-def test_a_fault_of_a_whole_file_has_no_picture(tmp_path: Path) -> None:
-    with pytest.raises(UserError) as raised:
+    stop([], tmp_path)
+    with pytest.raises(UserError) as raised:  # of a whole file: without a picture
         stop([replace(THIN, around=(), spot=None)], tmp_path)
     assert "see" not in str(raised.value)
     assert list(tmp_path.iterdir()) == []
+    with pytest.raises(UserError) as raised:
+        stop(faults, tmp_path)
+    told = "(20 faults in all: unit A1, unit A2, unit A3, unit A4, unit A5, ...)"
+    assert told in str(raised.value)
+    assert len(list(tmp_path.glob("*.png"))) == PICTURES

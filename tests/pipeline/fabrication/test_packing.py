@@ -14,23 +14,15 @@ sizes = st.lists(st.tuples(lengths, lengths), max_size=40)
 def test_every_part_lies_once_inside_the_margin_and_apart(parts: list[tuple[float, float]]) -> None:
     spots = pack(parts, SHEET, MARGIN, GAP)
     assert [spot.part for spot in spots] == list(range(len(parts)))
-    for sheet in {spot.sheet for spot in spots}:
-        boxes = [
-            box(s.x, s.y, s.x + parts[s.part][0], s.y + parts[s.part][1])
-            for s in spots
-            if s.sheet == sheet
-        ]
+    used = {spot.sheet for spot in spots}
+    assert used == set(range(len(used)))
+    for sheet in used:
+        here = [(s.x, s.y, *parts[s.part]) for s in spots if s.sheet == sheet]
+        boxes = [box(x, y, x + width, y + height) for x, y, width, height in here]
         room = box(MARGIN, MARGIN, SHEET[0] - MARGIN, SHEET[1] - MARGIN).buffer(1e-6)
         assert all(room.covers(placed) for placed in boxes)
         pairs = STRtree(boxes).query(boxes, "dwithin", GAP - 1e-6)
         assert (pairs[0] == pairs[1]).all()
-
-
-@given(sizes)
-def test_sheets_are_numbered_without_gaps(parts: list[tuple[float, float]]) -> None:
-    spots = pack(parts, SHEET, MARGIN, GAP)
-    used = {spot.sheet for spot in spots}
-    assert used == set(range(len(used)))
 
 
 def test_equal_parts_stay_in_their_order() -> None:

@@ -27,6 +27,9 @@ from sim.structure import Lattice, design_space, quads
 from tests.pipeline.fabrication import built, handmade
 
 DESIGN = Path("design.nc")
+LATTICE = quads(4, 4, 15.0, 2.25, np.deg2rad(20.0))
+ROOM = Fabrication().slot_room
+LIMITS = Limits(edge_length=3.0, convex=True, void_angle=0.0, gap=0.2, slots=ROOM)
 
 
 def way(degrees: float) -> Floats:
@@ -36,9 +39,8 @@ def way(degrees: float) -> Floats:
 def elastica(start: float, end: float, chord: float) -> float:
     """Largest curvature of an inextensible strip that slides in clamps at both ends of a chord.
 
-    The angle t of a strip under end forces (p, q) obeys t'' = -p sin t - q cos t over its length.
-    Its energy is least over that length too where the Hamiltonian t'^2 / 2 - p cos t + q sin t
-    vanishes.
+    Its angle t under end forces (p, q) obeys t'' = -p sin t - q cos t; its energy is least over
+    its length too where t'^2 / 2 - p cos t + q sin t vanishes.
     """
 
     def slopes(_: Floats, y: Floats, p: Floats) -> Floats:
@@ -78,9 +80,8 @@ def test_a_shim_of_the_paper_towards_the_centroids_is_bent_to_an_arc() -> None:
 
 
 def test_slots_of_the_regular_lattice_leave_its_shims_straight() -> None:
-    specimen = build_specimen(
-        network(built.design(), "cloaked"), Fabrication(), ("toy", ""), DESIGN
-    )
+    net = network(built.design(), "cloaked")
+    specimen = build_specimen(net, Fabrication(), ("toy", ""), DESIGN)
     assert max(ligament.strain for ligament in specimen.ligaments) < 1e-9
     assert specimen.bent == []
 
@@ -106,9 +107,8 @@ def sharpened() -> xr.Dataset:
 
 
 def test_shims_that_are_bent_too_much_are_refused() -> None:
-    settings = Fabrication.model_validate(
-        {"slots": {"direction": "centroid"}, "shims": {"prebend_strain": 0.02}}, context=SIM_UNITS
-    )
+    asked = {"slots": {"direction": "centroid"}, "shims": {"prebend_strain": 0.02}}
+    settings = Fabrication.model_validate(asked, context=SIM_UNITS)
     with pytest.raises(UnbuildableUnitError) as caught:
         build_specimen(network(built.design(), "cloaked"), settings, ("toy", ""), DESIGN)
     assert caught.value.key == "fabrication.shims.prebend_strain"
@@ -133,43 +133,37 @@ def network_of(lattice: Lattice, vertices: Floats) -> UnitNetwork:
     """All units and ligaments of a lattice with its vertices there."""
     rings = np.split(vertices, lattice.first_vertex[1:-1])
     own = np.arange(lattice.n_vertices) - lattice.first_vertex[lattice.unit]
-    joints = [
-        (
-            number,
-            (int(lattice.unit[a]), int(own[a])),
-            (int(lattice.unit[b]), int(own[b])),
-            (vertices[b] - vertices[a]) / np.linalg.norm(vertices[b] - vertices[a]),
-        )
-        for number, (a, b) in enumerate(lattice.ligaments)
-    ]
+    joints = []
+    for number, (a, b) in enumerate(lattice.ligaments):
+        ends = [(int(lattice.unit[k]), int(own[k])) for k in (a, b)]
+        along = (vertices[b] - vertices[a]) / np.linalg.norm(vertices[b] - vertices[a])
+        joints.append((number, ends[0], ends[1], along))
     index = [(int(i), int(j)) for i, j in lattice.index]
-    units = range(lattice.n_units)
-    return UnitNetwork(
-        tuple(units),
-        {unit: Polygon(ring) for unit, ring in zip(units, rings, strict=True)},
-        dict(zip(units, labels(index), strict=True)),
-        dict(zip(units, index, strict=True)),
-        tuple(joints),
-        (),
-        (),
-    )
+    polygons = dict(enumerate(map(Polygon, rings)))
+    named = dict(enumerate(labels(index))), dict(enumerate(index))
+    return UnitNetwork(tuple(polygons), polygons, *named, tuple(joints), (), ())
+
+
+def designs(
+    seed: int, limits: Limits, *, turning: bool = False
+) -> tuple[ConstraintVector, Floats, int]:
+    """Random designs of 4 x 4 squares, ever larger, and which is the last within the limits."""
+    space = design_space(LATTICE, np.array([5, 6, 9, 10]), turning=turning)
+    constraints = ConstraintVector(space, limits)
+    way = np.random.default_rng(seed).uniform(-1.0, 1.0, space.n_variables)
+    drawn = np.linspace(0.0, 6.0, 121)[:, None] * way
+    least = np.array([constraints.values(design).min() for design in drawn])
+    return constraints, drawn, int(np.argmax(least < 0.0)) - 1
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_design_with_room_for_straight_slots_has_none_that_turns(seed: int) -> None:
     """Random shifts, as large as the limits allow: the rule of slots finds straight ones."""
-    settings, lattice = Fabrication(), quads(4, 4, 15.0, 2.25, np.deg2rad(20.0))
-    space = design_space(lattice, np.array([5, 6, 9, 10]))
-    room = settings.slot_room
-    limits = Limits(edge_length=3.0, convex=True, void_angle=0.0, gap=0.2, slots=room)
-    constraints = ConstraintVector(space, limits)
-    way = np.random.default_rng(seed).uniform(-1.0, 1.0, space.n_variables)
-    shares = np.linspace(0.0, 6.0, 121)
-    least = np.array([constraints.values(share * way).min() for share in shares])
-    last = int(np.argmax(least < 0.0)) - 1
-    kept, lost = (constraints.vertices(shares[last + more] * way) for more in (0, 30))
+    settings = Fabrication()
+    constraints, drawn, last = designs(seed, LIMITS)
+    kept, lost = (constraints.vertices(drawn[last + more]) for more in (0, 30))
     straight, bent = (
-        strains(lattice, unit_bodies(network_of(lattice, each), settings, DESIGN), settings)
+        strains(LATTICE, unit_bodies(network_of(LATTICE, each), settings, DESIGN), settings)
         for each in (kept, lost)
     )
     assert straight.max() < 1e-9
@@ -179,22 +173,14 @@ def test_a_design_with_room_for_straight_slots_has_none_that_turns(seed: int) ->
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_slots_that_turn_with_the_design_are_drawn_so(seed: int) -> None:
     """Random shifts and angles, as large as the limits allow."""
-    settings, lattice = Fabrication(), quads(4, 4, 15.0, 2.25, np.deg2rad(20.0))
-    space = design_space(lattice, np.array([5, 6, 9, 10]), turning=True)
-    limits = Limits(
-        edge_length=3.0, convex=True, void_angle=0.0, gap=0.2,
-        slots=settings.slot_room, slot_turn=np.deg2rad(30.0),
-    )  # fmt: skip
-    constraints = ConstraintVector(space, limits)
-    way = np.random.default_rng(seed).uniform(-1.0, 1.0, space.n_variables)
-    shares = np.linspace(0.0, 6.0, 121)
-    least = np.array([constraints.values(share * way).min() for share in shares])
-    design = shares[int(np.argmax(least < 0.0)) - 1] * way
-    angles = np.asarray(space.end_angles(design))
-    net = network_of(lattice, constraints.vertices(design))
+    limits = replace(LIMITS, slot_turn=np.deg2rad(30.0))
+    constraints, drawn, last = designs(seed, limits, turning=True)
+    space = design_space(LATTICE, np.array([5, 6, 9, 10]), turning=True)
+    angles = np.asarray(space.end_angles(drawn[last]))
+    net = network_of(LATTICE, constraints.vertices(drawn[last]))
     turned = replace(net, turns={number: (a, b) for number, (a, b) in enumerate(angles.tolist())})
     assert np.degrees(np.abs(angles)).max() > 3.0
-    np.testing.assert_allclose(end_angles(turned, settings, DESIGN), angles, atol=1e-9)
+    np.testing.assert_allclose(end_angles(turned, Fabrication(), DESIGN), angles, atol=1e-9)
 
 
 def test_turned_slots_of_a_slender_unit_are_as_deep_as_its_design_has_room_for() -> None:

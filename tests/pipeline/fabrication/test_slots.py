@@ -14,6 +14,8 @@ from pipeline.problem.sections import Fabrication
 
 ASKED = Fabrication()
 HAIR = 1e-4
+NARROW = [(4.46896165512347, 0.22362346), (3.832e-16, 6.256990381816461)]
+NARROW += [(-4.33, 1.1057908244251284), (-1.15e-15, -6.258)]
 
 
 def asked(**slots: object) -> Fabrication:
@@ -83,17 +85,7 @@ def test_slot_in_a_sharp_corner_goes_deeper_for_its_walls() -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(quads(), st.sampled_from(["centroid", "ligament", "bisector"]))
-@example(
-    Polygon(
-        [
-            (4.46896165512347, 0.22362346),
-            (3.832e-16, 6.256990381816461),
-            (-4.33, 1.1057908244251284),
-            (-1.15e-15, -6.258),
-        ]
-    ),
-    "bisector",
-)
+@example(Polygon(NARROW), "bisector")
 def test_slots_leave_walls_keep_apart_and_open_at_their_vertices(
     polygon: Polygon, direction: str
 ) -> None:

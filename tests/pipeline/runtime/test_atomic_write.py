@@ -3,9 +3,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
-from pipeline.runtime import UserError, write_atomically
+from pipeline.runtime import write_atomically
+from tests.tables import refused
 
 OTHER = """
 import sys
@@ -42,6 +41,8 @@ def test_what_a_killed_process_left_goes_and_what_a_living_one_writes_stays(
 
 def test_a_folder_that_is_a_file_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(UserError) as caught, write_atomically(tmp_path / "file/out.txt"):
+    with (
+        refused("", file=tmp_path / "file/out.txt"),
+        write_atomically(tmp_path / "file/out.txt"),
+    ):
         pass
-    assert caught.value.file == str(tmp_path / "file/out.txt")

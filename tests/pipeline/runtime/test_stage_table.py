@@ -42,11 +42,9 @@ def test_help_loads_nothing_heavy(words: list[str]) -> None:
         "try:\n    main(sys.argv[1:])\nexcept SystemExit as end:\n    assert end.code == 0\n"
         f"print('loaded', [name for name in {HEAVY} if name in sys.modules])"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", script, *words], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.endswith("loaded []\n")
-    assert "usage: python -m pipeline" in done.stdout
+    told = subprocess.check_output([sys.executable, "-c", script, *words], text=True)
+    assert told.endswith("loaded []\n")
+    assert "usage: python -m pipeline" in told
 
 
 def test_a_stage_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
@@ -58,8 +56,7 @@ def test_a_stage_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
     ("old", "new"), [("pipeline.reconsider", "redesign"), ("pipeline.reference", "reference")]
 )
 def test_an_old_command_runs_with_a_note(old: str, new: str) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", old, "--help"], capture_output=True, text=True, check=True
-    )
+    command = [sys.executable, "-m", old, "--help"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stderr == f"note: python -m {old} is now python -m pipeline {new}\n"
     assert f"usage: python -m pipeline {new}" in done.stdout

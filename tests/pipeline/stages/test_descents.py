@@ -9,11 +9,11 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.__main__ import run_stage
 from pipeline.problem import Problem
 from pipeline.problem.sections import Method, Methods
 from pipeline.stages import design
 from sim.optimise import Result
+from tests.pipeline import static
 from tests.pipeline.static import HOLE, write
 
 
@@ -22,23 +22,10 @@ def designed(folder: Path, angle: str, descents: int = 1, seed: int = 0) -> xr.D
     folder.mkdir()
     path = write(folder, HOLE, size=5, amplitude=3.0)
     more = f"angle: {angle}, descents: {descents}, seed: {seed}, geometric:"
-    text = (
-        path.read_text()
-        .replace("law: angle", "law: geometric")
-        .replace("geometric: {", more + " {")
-    )
+    text = path.read_text().replace("law: angle", "law: geometric")
+    text = text.replace("geometric: {", more + " {")
     path.write_text(text.replace("sqp: { evaluations: 4 }", "sqp: { evaluations: 6 }"))
-    options = ["--problem", str(path), "--quiet", "--out"]
-    made, chosen = str(folder / "sqp.nc"), folder / "design.nc"
-    assert run_stage("design", [*options, made, "--method", "sqp"]) == 0
-    assert run_stage("select", [*options, str(chosen), "--designs", made]) == 0
-    return datasets.read(chosen, "design")
-
-
-def losses(design: xr.Dataset) -> list[float]:
-    """Of all descents."""
-    found: list[float] = json.loads(design.attrs["plan"])["descents"]
-    return found
+    return datasets.read(static.designed(path), "design")
 
 
 def test_a_design_by_the_angle_law_is_where_it_starts(hole: list[str], tmp_path: Path) -> None:
@@ -62,7 +49,7 @@ def test_the_best_of_several_descents_is_shipped(
 
     monkeypatch.setattr(design, "optimise", limited)
     shipped = designed(tmp_path / "all", "null", descents=3, seed=4)
-    first, second, third = losses(shipped)
+    first, second, third = json.loads(shipped.attrs["plan"])["descents"]
     assert second < third < first
     assert float(shipped["best_loss"][0]) == second
     assert shipped.sizes["evaluation"] == 6

@@ -10,7 +10,9 @@ from pipeline.posing import scene_of
 from pipeline.posing.perturbed import noises, simulate
 from pipeline.stages import verify
 from sim.core import SimulationError
+from sim.solvers import batch, solve_case
 from tests.pipeline import static, unchanged
+from tests.pipeline.conftest import Failing
 
 MORE = "robustness: { samples: 4, geometry: [0.05], stiffness: [0.1], seed: 3 }\n"
 
@@ -39,11 +41,8 @@ def whole(folder: Path) -> xr.Dataset:
 
 
 def test_every_copy_is_another_one(whole: xr.Dataset) -> None:
-    assert list(whole["noise"].values) == [
-        "geometry 5 %",
-        "stiffness 10 %",
-        "together 0.1 mm, 10 %",
-    ]
+    noises = ["geometry 5 %", "stiffness 10 %", "together 0.1 mm, 10 %"]
+    assert list(whole["noise"].values) == noises
     assert (whole["status"] == "ok").all()
     assert len(np.unique(whole["loss"])) == 12
     np.testing.assert_allclose(whole["time"], [0.25, 0.5, 0.75, 1.0])
@@ -62,9 +61,8 @@ def test_parts_join_to_the_whole(folder: Path, tmp_path: Path) -> None:
 def test_without_noise_every_copy_is_the_design(folder: Path) -> None:
     asked = problem.load(folder / "problem.yaml")
     assert asked.robustness is not None
-    none = asked.robustness.model_copy(
-        update={"geometry": (0.0,), "stiffness": (0.0,), "together": None}
-    )
+    nothing = {"geometry": (0.0,), "stiffness": (0.0,), "together": None}
+    none = asked.robustness.model_copy(update=nothing)
     scene = scene_of(asked, folder)
     made = simulate(scene, scene.lattice.vertices, none, [0, 1], 1)
     checked = verify.checks(asked, folder, datasets.read(folder / "design.nc", "design"))
@@ -73,16 +71,13 @@ def test_without_noise_every_copy_is_the_design(folder: Path) -> None:
 
 
 def test_a_copy_that_fails_keeps_its_reason(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from sim.solvers import batch
-    from sim.solvers import solve_case as solve
-
     calls = []
 
     def failing(*given: object) -> object:
         calls.append(given)
         if len(calls) == 2:
             raise SimulationError("no equilibrium found beyond load 3 of 4")
-        return solve(*given)  # type: ignore[arg-type]
+        return solve_case(*given)  # type: ignore[arg-type]
 
     monkeypatch.setattr(batch, "solve_case", failing)
     asked = problem.load(folder / "problem.yaml")
@@ -94,14 +89,11 @@ def test_a_copy_that_fails_keeps_its_reason(folder: Path, monkeypatch: pytest.Mo
     assert np.isnan(first["loss"].values).tolist() == [False, True, False]
 
 
-def test_a_problem_without_copies_is_told(
-    folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_problem_without_copies_is_told(folder: Path, tmp_path: Path, failing: Failing) -> None:
     path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
     words = ["--design", str(folder / "design.nc"), "--chunk", "0", "--chunks", "1"]
     out = ["--out", str(tmp_path / "scatter.nc")]
-    assert run_stage("monte_carlo", ["run", "--problem", str(path), *words, *out]) == 2
-    assert "robustness" in capfd.readouterr().err
+    assert "robustness" in failing("monte_carlo", ["run", "--problem", str(path), *words, *out])
 
 
 def test_finer_load_steps_pass_the_same_states(folder: Path, tmp_path: Path) -> None:

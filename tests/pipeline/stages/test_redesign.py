@@ -32,9 +32,8 @@ def reconsidered(study: Path, out: Path, factor: float) -> tuple[xr.Dataset, xr.
     options = ["--problem", str(study / "problem.yaml"), "--quiet", "--out"]
     first = ["--design", str(study / "design.nc"), "--response", str(told)]
     assert run_stage("redesign", [*options, str(second), *first]) == 0
-    assert (
-        run_stage("simulate", [*options, str(moved), "--design", str(second), "--geometric"]) == 0
-    )
+    again = [*options, str(moved), "--design", str(second), "--geometric"]
+    assert run_stage("simulate", again) == 0
     return datasets.read(second, "design"), datasets.read(moved, "response")
 
 

@@ -11,6 +11,7 @@ from pipeline.problem.sections import Sweep, sweep_cases
 from pipeline.runtime import CaseLog, SweepResult, UserError, case_log
 from sim.scene import Evaluator, make_plan
 from tests.pipeline import static, unchanged
+from tests.tables import cases
 
 GRID = """sweep:
   grid:
@@ -134,10 +135,8 @@ def test_random_cases_do_not_depend_on_their_number(tmp_path: Path) -> None:
 
 def test_values_side_by_side() -> None:
     wanted = Sweep.model_validate({"list": {"a.b": ["1 mm", "2 mm"], "c": ["x", "y"]}})
-    assert list(sweep_cases.list_settings(wanted)) == [
-        {"a.b": "1 mm", "c": "x"},
-        {"a.b": "2 mm", "c": "y"},
-    ]
+    listed = [{"a.b": "1 mm", "c": "x"}, {"a.b": "2 mm", "c": "y"}]
+    assert list(sweep_cases.list_settings(wanted)) == listed
     assert sweep_cases.parameter_unit(wanted, "c") == "1"
 
 
@@ -145,15 +144,10 @@ def test_directions_are_load_cases_of_one_scene() -> None:
     grid = {"drive.directions": ["0 deg", "90 deg"], "drive.frequency": ["2 Hz", "3 Hz", "4 Hz"]}
     wanted = Sweep.model_validate({"grid": grid})
     parts = [sweep_cases.select_groups(wanted, k, 2) for k in range(2)]
-    assert [group.numbers for part in parts for group in part] == [
-        range(2),
-        range(2, 4),
-        range(4, 6),
-    ]
-    assert parts[1][0].together == {
-        "drive.directions": ["0 deg", "90 deg"],
-        "drive.frequency": "3 Hz",
-    }
+    numbers = [group.numbers for part in parts for group in part]
+    assert numbers == [range(2), range(2, 4), range(4, 6)]
+    together = {"drive.directions": ["0 deg", "90 deg"], "drive.frequency": "3 Hz"}
+    assert parts[1][0].together == together
 
 
 def test_a_setting_that_makes_no_problem_is_told(folder: Path) -> None:
@@ -168,16 +162,7 @@ def test_a_setting_that_makes_no_problem_is_told(folder: Path) -> None:
             setting_losses.results(asked, setting, folder, design, 1)
 
 
-@pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        ("sweep: { grid: { drive.amplitude: [1 mm, 2] } }", "several units"),
-        ("sweep: { list: { drive.amplitude: [1 mm], horizon.steps: [2, 3] } }", "more values"),
-        ("sweep: { random: { drive.amplitude: { from: 1 mm, to: 2 mm } } }", "belong together"),
-        ("sweep: { grid: { drive.hue: [1] } }", "unknown key"),
-        ("sweep: { grid: { horizon.steps: [1 mm] } }", "not a whole number"),
-    ],
-)
+@cases("stages", "text, why")
 def test_a_faulty_sweep_is_told(tmp_path: Path, text: str, why: str) -> None:
     with pytest.raises(UserError, match=why):
         problem.load(static.write(tmp_path, static.HOLE + text))

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+import yaml
 
 from pipeline import datasets
 from pipeline.problem.sections import VirtualRecording
@@ -13,18 +14,13 @@ from pipeline.virtual_lab import prepare_film, select_case
 from pipeline.virtual_lab.filming import VirtualFilm
 from tests.pipeline.samples import sample
 
-GRID = {
-    "name": "grid",
-    "grid": [7, 7],
-    "spacing_mm": 15.0,
-    "ligament_gap_mm": 2.3,
-    "bias_angle_deg": 20.0,
-}
-SETUP = {
-    "rate": "20 Hz",
-    "still": "0.1 s",
-    "camera": {"image": [320, 320], "tilt": ["2 deg", "-1 deg"], "distortion": [0.01, 0.0]},
-}
+GRID = yaml.safe_load("""
+{ name: grid, grid: [7, 7], spacing_mm: 15.0, ligament_gap_mm: 2.3, bias_angle_deg: 20.0 }
+""")
+SETUP = yaml.safe_load("""
+{ rate: 20 Hz, still: 0.1 s,
+  camera: { image: [320, 320], tilt: [2 deg, -1 deg], distortion: [0.01, 0.0] } }
+""")
 
 
 def response(design: xr.Dataset) -> xr.Dataset:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import shapely
+import yaml
 
 from pipeline.problem.sections import CameraView, UnitAppearance
 from pipeline.tracking.geometry import SpecimenOutlines
@@ -12,6 +13,10 @@ from pipeline.virtual_lab.face_marks import draw_marks
 from pipeline.virtual_lab.film_scene import FilmScene
 from pipeline.virtual_lab.filming import VirtualFilm
 
+CAMERA = """
+{ image: [64, 64], pixel_size: 0.5 mm, distance: 60 mm, tilt: [6 deg, -8 deg],
+  distortion: [0.02, 0.01] }
+"""
 SAMPLES = 16
 DEPTH = 8.0
 
@@ -20,35 +25,19 @@ def test_a_pixel_is_covered_by_what_lies_in_it() -> None:
     random = np.random.default_rng(5)
     angle = np.sort(random.uniform(0, 2 * np.pi, 7))
     corner = np.array([5.3, 4.1]) + 4.9 * np.column_stack([np.cos(angle), -np.sin(angle)])
-    made = coverage.coverage_image(
-        NestedPolygons(corner, np.array([0, 7]), np.array([1.0])), (9, 11)
-    )
-    polygon = shapely.Polygon(corner)
+    nested = NestedPolygons(corner, np.array([0, 7]), np.array([1.0]))
+    made = coverage.coverage_image(nested, (9, 11))
     column, row = np.meshgrid(np.arange(11), np.arange(9))
     pixels = shapely.box(column - 0.5, row - 0.5, column + 0.5, row + 0.5)
-    np.testing.assert_allclose(
-        made, shapely.area(shapely.intersection(pixels, polygon)), atol=1e-12
-    )
+    covered = shapely.area(shapely.intersection(pixels, shapely.Polygon(corner)))
+    np.testing.assert_allclose(made, covered, atol=1e-12)
 
 
 def one_unit(look: UnitAppearance) -> FilmScene:
     corner = np.array([[5.0, 1.0], [-1.5, 5.5], [-6.0, -1.0], [1.0, -6.0]])
-    specimen = SpecimenOutlines(
-        np.array([0]),
-        np.array([[2.0, 1.0]]),
-        corner[None],
-        np.empty((0, 2), int),
-        np.zeros((1, 4), bool),
-    )
-    asked = CameraView.model_validate(
-        {
-            "image": [64, 64],
-            "pixel_size": "0.5 mm",
-            "distance": "60 mm",
-            "tilt": ["6 deg", "-8 deg"],
-            "distortion": [0.02, 0.01],
-        }
-    )
+    nowhere = np.empty((0, 2), int), np.zeros((1, 4), bool)
+    specimen = SpecimenOutlines(np.array([0]), np.array([[2.0, 1.0]]), corner[None], *nowhere)
+    asked = CameraView.model_validate(yaml.safe_load(CAMERA))
     view = viewpoint(asked, np.array([12.0, 5.0]))
     discs = draw_marks(specimen, "dots", look, 0)
     return FilmScene(specimen, np.empty((0, 2, 2), int), discs, look, view)

@@ -20,6 +20,7 @@ from pipeline.virtual_lab.imperfect_specimen import ImperfectDrive, imperfect_dr
 from sim.scene import Scene
 from tests.pipeline import static
 from tests.pipeline.virtual_lab.conftest import SETUP
+from tests.tables import cases
 
 NOTHING = dict.fromkeys(("geometry", "ligaments", "stiffness", "units", "damping"), 0.0) | {
     "assembly": {"shift": "0 mm", "turn": "0 deg"}
@@ -53,28 +54,20 @@ def test_a_drive_without_faults_is_the_planned_one(study: tuple[Problem, Scene])
 
 def test_each_fault_of_a_drive_does_what_it_says(study: tuple[Problem, Scene]) -> None:
     scene = study[1]
-    last = {
-        name: np.asarray(drive(scene, **{name: value})(TIMES))[-1]
-        for name, value in {
-            "gain": 0.5,
-            "turn": "90 deg",
-            "cross": 0.1,
-            "tilt": "0.01 rad",
-            "drift": ["1 mm", "2 mm"],
-            "delay": "0.25 s",
-        }.items()
+    faults: dict[str, tuple[object, list[float]]] = {
+        "gain": (0.5, [-2, 0]),
+        "turn": ("90 deg", [0, -4]),
+        "cross": (0.1, [-4, -0.4]),
+        "drift": (["1 mm", "2 mm"], [-3, 2]),
+        "delay": ("0.25 s", [-3, 0]),
     }
-    rest: dict[str, list[float]] = {
-        "gain": [-2, 0],
-        "turn": [0, -4],
-        "cross": [-4, -0.4],
-        "drift": [-3, 2],
-    }
-    for name, there in (rest | {"delay": [-3, 0]}).items():
-        np.testing.assert_allclose(last[name][:, :2], [there] * 5, atol=1e-9, err_msg=name)
-        assert (last[name][:, 2] == 0).all()
-    np.testing.assert_allclose(last["tilt"][:, 2], 0.01)
-    np.testing.assert_allclose(last["tilt"][:, 0] + 4, -0.01 * 15 * np.arange(-2, 3), atol=1e-4)
+    for name, (value, there) in faults.items():
+        last = np.asarray(drive(scene, **{name: value})(TIMES))[-1]
+        np.testing.assert_allclose(last[:, :2], [there] * 5, atol=1e-9, err_msg=name)
+        assert (last[:, 2] == 0).all()
+    tilted = np.asarray(drive(scene, tilt="0.01 rad")(TIMES))[-1]
+    np.testing.assert_allclose(tilted[:, 2], 0.01)
+    np.testing.assert_allclose(tilted[:, 0] + 4, -0.01 * 15 * np.arange(-2, 3), atol=1e-4)
     half = np.asarray(drive(scene, cross=0.1)(np.array([0.5])))[0, 0]
     np.testing.assert_allclose(half, [-2.0, -0.1, 0.0], atol=1e-9)  # as on an arc
 
@@ -107,21 +100,11 @@ def test_a_specimen_without_tolerances_is_the_design(study: tuple[Problem, Scene
     assert asked.response.samples == 9
 
 
-@pytest.mark.parametrize(
-    ("change", "told"),
-    [
-        ({"case": 3}, "no such case"),
-        ({"structure": "cloaked"}, "no such structure"),
-        ({"virtual": {}}, "has no specimen"),
-        ({"virtual": {"specimen": {"assembly": {"turn": "80 deg"}}}}, "overlap"),
-    ],
-)
+@cases("virtual_lab", "change, told")
 def test_a_specimen_that_cannot_be_is_refused(
-    study: tuple[Problem, Scene],
-    change: dict[str, object],
-    told: str,
+    study: tuple[Problem, Scene], change: dict[str, object], told: str,
     monkeypatch: pytest.MonkeyPatch,
-) -> None:
+) -> None:  # fmt: skip
     monkeypatch.setattr("sim.structure.perturbation.MOST_ROUNDS", 1)
     recording = {"structure": "altered", "virtual": {"specimen": {}}} | change
     held = {"altered": PosedStructure(study[1], study[1].lattice.vertices)}

@@ -18,6 +18,7 @@ from pipeline.virtual_lab import prepare_film, select_case
 from pipeline.virtual_lab.face_marks import FaceMarks
 from pipeline.virtual_lab.filming import VirtualFilm
 from tests.pipeline.virtual_lab.conftest import SETUP, film_of
+from tests.tables import cases
 
 DARK, LIGHT = 0.05, 0.8
 
@@ -39,16 +40,7 @@ def check(film: VirtualFilm, track: Track, bar: float = 0.03) -> None:
     assert np.rad2deg(np.sqrt(np.mean(error[..., 2] ** 2))) < 0.15
 
 
-@pytest.mark.parametrize(
-    ("specimen", "look"),
-    [
-        ("dots", {"face": DARK, "side": DARK, "mark": LIGHT, "board": LIGHT}),
-        ("dots", {"face": LIGHT, "side": LIGHT, "mark": DARK, "board": 0.3}),
-        ("dots", {"face": 0.45, "side": 0.45, "mark": DARK, "board": 0.3}),
-        ("speckle", {"face": LIGHT, "side": LIGHT, "mark": DARK, "board": 0.2}),
-        ("bare", {"face": LIGHT, "side": LIGHT, "board": DARK}),
-    ],
-)
+@cases("virtual_lab", "specimen, look")
 def test_shades_of_faces_marks_and_board(specimen: str, look: dict[str, float]) -> None:
     film = filmed(specimen, **look)
     check(film, track_video(shown(film), film.scene.specimen, 1 / 0.365))

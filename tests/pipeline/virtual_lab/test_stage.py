@@ -9,7 +9,9 @@ import yaml
 from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.virtual_lab.filming import VirtualFilm
+from tests.pipeline.conftest import Failing
 from tests.pipeline.virtual_lab.conftest import SETUP
+from tests.tables import cases
 
 
 def recording(folder: Path, **changes: object) -> Path:
@@ -19,9 +21,13 @@ def recording(folder: Path, **changes: object) -> Path:
     return path
 
 
+def words(files: Path, asked: Path, out: Path) -> list[str]:
+    held = ["--response", str(files / "response.nc"), "--design", str(files / "design.nc")]
+    return ["render", str(asked), *held, "--quiet", "--out", str(out)]
+
+
 def render(files: Path, asked: Path, out: Path) -> int:
-    words = ["render", str(asked), "--response", str(files / "response.nc"), "--quiet"]
-    return run_stage("film", [*words, "--design", str(files / "design.nc"), "--out", str(out)])
+    return run_stage("film", words(files, asked, out))
 
 
 def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> None:
@@ -34,10 +40,8 @@ def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> No
     with out.with_suffix(".yaml").open("w", encoding="utf-8") as file:
         file.write(described.replace("synthetic: true\n", ""))  # the video itself says so
         file.write("load_cell: {file: load.csv, time: s, force: N, offset: 5}\n")
-    assert (
-        run_stage("track", [str(out.with_suffix(".yaml")), "--out", str(tmp_path / "track.nc")])
-        == 0
-    )
+    tracked = [str(out.with_suffix(".yaml")), "--out", str(tmp_path / "track.nc")]
+    assert run_stage("track", tracked) == 0
     made = datasets.read(tmp_path / "track.nc", "track")
     truth = datasets.read(tmp_path / "run_truth.nc", "truth")
     assert made.attrs["synthetic"] == truth.attrs["synthetic"] == "yes"
@@ -54,13 +58,13 @@ def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> No
 
 
 def test_a_video_is_not_described_over_the_file_that_asked_for_it(
-    files: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    files: Path, tmp_path: Path, failing: Failing
 ) -> None:
     asked = recording(tmp_path)
     before = asked.read_bytes()
-    assert render(files, asked, asked.with_suffix(".mp4")) == 2
+    told = failing("film", words(files, asked, asked.with_suffix(".mp4")))
+    assert "would be written over" in told
     assert asked.read_bytes() == before
-    assert "would be written over" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("codec", ["h264", "ffv1"])
@@ -81,24 +85,12 @@ def test_the_specimen_rests_first_and_then_moves(film: VirtualFilm) -> None:
     np.testing.assert_allclose(film.motion.pose[12, 0, 2], -0.3 * 0.5, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("change", "told"),
-    [
-        ({"camera": {"image": [128, 128]}}, "does not fit"),
-        ({"start": "7 s"}, "has ended by then"),
-        ({"rate": "20"}, "rate"),
-    ],
-)
+@cases("virtual_lab", "change, told")
 def test_what_cannot_be_filmed_is_refused(
-    files: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    change: dict[str, object],
-    told: str,
+    files: Path, tmp_path: Path, failing: Failing, change: dict[str, object], told: str
 ) -> None:
     out = tmp_path / "out/run.mp4"
-    assert render(files, recording(tmp_path, **change), out) == 2
-    assert told in capsys.readouterr().err
+    assert told in failing("film", words(files, recording(tmp_path, **change), out))
     assert not out.parent.exists()
 
 
@@ -114,21 +106,16 @@ def test_a_plan_tells_what_to_expect(files: Path, tmp_path: Path) -> None:
     assert lossless["lost_percent"] == "0"
 
 
-def test_a_plan_without_sense_is_refused(
-    files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["plan", "--response", str(files / "response.nc"), "--csv", str(tmp_path / "plan.csv")]
-    assert run_stage("film", [*words, "--codec", "vhs"]) == 2
-    assert run_stage("film", [*words, "--fps", "-3"]) == 2
-    told = capsys.readouterr().err
-    assert "no such codec" in told
-    assert "greater than zero" in told
+def test_a_plan_without_sense_is_refused(files: Path, tmp_path: Path, failing: Failing) -> None:
+    plan = ["plan", "--response", str(files / "response.nc"), "--csv", str(tmp_path / "plan.csv")]
+    assert "no such codec" in failing("film", [*plan, "--codec", "vhs"])
+    assert "greater than zero" in failing("film", [*plan, "--fps", "-3"])
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("codec", ["h264", "ffv1"])
 def test_a_rendered_video_that_was_damaged_is_not_tracked(
-    files: Path, tmp_path: Path, codec: str, capsys: pytest.CaptureFixture[str]
+    files: Path, tmp_path: Path, codec: str, failing: Failing
 ) -> None:
     """One bit, in whatever format; a frame that decodes to other numbers would tell nothing."""
     out = tmp_path / "run.mp4"
@@ -136,9 +123,7 @@ def test_a_rendered_video_that_was_damaged_is_not_tracked(
     content = bytearray(out.read_bytes())
     content[len(content) // 2] ^= 1
     out.write_bytes(content)
-    described, track = out.with_suffix(".yaml"), tmp_path / "track.nc"
-    assert run_stage("track", [str(described), "--out", str(track)]) == 2
-    told = capsys.readouterr().err
+    described = out.with_suffix(".yaml")
+    told = failing("track", [str(described), "--out", str(tmp_path / "track.nc")])
     assert "damaged: run.mp4 is not the video that was described" in told
     assert "key:    sha256" in told
-    assert not track.exists()

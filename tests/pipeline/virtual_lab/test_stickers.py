@@ -11,6 +11,7 @@ import pytest
 from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.tracking.frames import import_video
+from tests.pipeline.conftest import Failing
 from tests.pipeline.tracking.test_dic_points import SMALL
 
 POINT = 72 / 25.4
@@ -53,11 +54,7 @@ def test_speckle_is_thrown_on_all_faces(design: Path, tmp_path: Path) -> None:
 
 
 def test_dots_that_cannot_be_printed_are_refused(
-    design: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    design: Path, tmp_path: Path, failing: Failing
 ) -> None:
-    out = tmp_path / "marks.pdf"
-    assert (
-        run_stage("markers", ["--design", str(design), "--out", str(out), "--diameter", "40"]) == 2
-    )
-    assert "cannot be printed" in capsys.readouterr().err
-    assert not out.exists()
+    words = ["--design", str(design), "--out", str(tmp_path / "marks.pdf"), "--diameter", "40"]
+    assert "cannot be printed" in failing("markers", words)

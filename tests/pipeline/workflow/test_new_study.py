@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw
 from pipeline.__main__ import run_stage
 from pipeline.problem import void_units
 from pipeline.problem.reading import load
+from tests.pipeline.conftest import Failing
 
 CAT = Path(__file__).parents[3] / "experiments/shapes/cat.png"
 
@@ -61,11 +62,8 @@ def test_a_coloured_logo_becomes_the_void(
     ],
 )
 def test_a_mistake_makes_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], told: str
+    tmp_path: Path, failing: Failing, words: list[str], told: str
 ) -> None:
     (tmp_path / "taken").mkdir()
-    assert run_stage("new", [*words, "--folder", str(tmp_path)]) == 2
-    error = capsys.readouterr().err
-    assert told in error
-    assert "remedy:" in error
+    assert told in failing("new", [*words, "--folder", str(tmp_path)])
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]

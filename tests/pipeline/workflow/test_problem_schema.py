@@ -8,6 +8,7 @@ import yaml
 
 from pipeline.__main__ import run_stage
 from pipeline.workflow import problem_schema
+from tests.tables import cases
 
 Problem = dict[str, Any]
 
@@ -38,27 +39,11 @@ def test_the_command_writes_it(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "schema.json").read_bytes()) == problem_schema.schema()
 
 
-def test_fig2_obeys_it(validator: jsonschema.Draft202012Validator, content: Problem) -> None:
-    assert validator.is_valid(content)
-
-
-@pytest.mark.parametrize(
-    ("keys", "value"),
-    [
-        (("lattice", "spacng"), "15 mm"),
-        (("lattice", "spacing"), 15),
-        (("lattice", "spacing"), "wide"),
-        (("drive", "kind"), "harmonics"),
-        (("presets", "quick", "latice"), {}),
-        (("presets", "quick", "lattice", "columns"), "7"),
-    ],
-)
+@cases("workflow", "keys, value")
 def test_mistakes_break_it(
-    keys: tuple[str, ...],
-    value: object,
-    validator: jsonschema.Draft202012Validator,
-    content: Problem,
+    keys: list[str], value: object, validator: jsonschema.Draft202012Validator, content: Problem
 ) -> None:
+    assert validator.is_valid(content)
     section = content
     for key in keys[:-1]:
         section = section[key]

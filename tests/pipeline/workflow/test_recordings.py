@@ -27,10 +27,9 @@ def test_a_preset_shows_those_that_name_it(folder: Path) -> None:
     assert shown(folder) == ["altered", "cloaked"]
     assert shown(folder, "study@quick") == ["cloaked"]
     assert shown(folder, "study@other") == []
-
-
-def test_a_study_without_recordings_shows_none(folder: Path) -> None:
     assert shown(folder, "another") == []
+    (folder / "broken.yaml").write_text("structure: [")  # its stage will tell why
+    assert shown(folder, "study@quick") == ["broken", "cloaked"]
 
 
 def test_a_film_takes_the_place_of_the_virtual_one_of_its_kind(folder: Path) -> None:
@@ -46,8 +45,3 @@ def test_a_film_that_a_preset_does_not_show_replaces_nothing_there(folder: Path)
     (folder / "lab7.yaml").write_text("video: lab7.mp4\nstructure: cloaked\n")
     assert shown(folder) == ["altered", "lab7"]
     assert shown(folder, "study@quick") == ["cloaked"]
-
-
-def test_one_that_cannot_be_read_is_shown_so_that_its_stage_tells_why(folder: Path) -> None:
-    (folder / "broken.yaml").write_text("structure: [")
-    assert shown(folder, "study@quick") == ["broken", "cloaked"]

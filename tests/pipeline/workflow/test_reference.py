@@ -23,10 +23,8 @@ def test_the_command_writes_them(tmp_path: Path) -> None:
 
 
 def test_every_variable_and_every_section_has_its_place() -> None:
-    assert (
-        "| `displacement` | structure, case, time, unit, dof | mm (ux, uy), rad (theta) |"
-        in (pages()["datasets.md"])
-    )
+    row = "| `displacement` | structure, case, time, unit, dof | mm (ux, uy), rad (theta) |"
+    assert row in pages()["datasets.md"]
     keys = pages()["keys.md"] + pages()["keys_recordings.md"]
     for row in (
         "| `spacing` | length (`mm`) |  | of the units, or of the cells. |",

@@ -6,6 +6,7 @@ import pytest
 
 from pipeline.__main__ import run_stage
 from pipeline.workflow import reproduce
+from tests.pipeline.conftest import Failing
 
 
 def written(folder: Path, **files: str) -> Path:
@@ -30,27 +31,15 @@ def build(text: str) -> object:
     return lambda _target, folder: written(folder / "results", design=text or next(texts))
 
 
-def test_two_equal_builds_are_reproducible(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(reproduce, "_built", build("same"))
-    assert run_stage("reproduce", ["fig2@quick"]) == 0
-    assert (
-        "fig2@quick: two builds have the same bytes (files compared: 1)" in capsys.readouterr().err
-    )
-
-
-def test_files_that_differ_are_named(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(reproduce, "_built", build(""))
-    assert run_stage("reproduce", ["fig2@quick"]) == 2
-    assert "1 of 1 files differ between two builds: design" in capsys.readouterr().err
-
-
-def test_a_build_that_fails_is_told(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_two_builds_are_compared(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], failing: Failing
 ) -> None:
     monkeypatch.setattr(reproduce, "SOURCES", ())
-    assert run_stage("reproduce", ["fig2@quick"]) == 2
-    assert "the build failed" in capsys.readouterr().err
+    assert "the build failed" in failing("reproduce", ["fig2@quick"])
+    monkeypatch.setattr(reproduce, "_built", build(""))
+    told = failing("reproduce", ["fig2@quick"])
+    assert "1 of 1 files differ between two builds: design" in told
+    monkeypatch.setattr(reproduce, "_built", build("same"))
+    assert run_stage("reproduce", ["fig2@quick"]) == 0
+    equal = "fig2@quick: two builds have the same bytes (files compared: 1)"
+    assert equal in capfd.readouterr().err
