@@ -26,13 +26,8 @@ from benchmarks.suites import suites
 from pipeline import datasets
 from tests.benchmarks import toy_benchmark
 
-ABOUT = {
-    "processor": "abacus",
-    "core": 0,
-    "commit": "0123456789abcdef",
-    "date": "2026-01-01T00:00",
-    "changed_since_commit": [],
-}
+ABOUT = {"processor": "abacus", "core": 0, "commit": "0123456789abcdef"}
+ABOUT |= {"date": "2026-01-01T00:00", "changed_since_commit": []}
 SETTINGS = (("10 points", 11.0), ("1000 points", 1001.0))
 
 
@@ -50,18 +45,17 @@ def toy() -> tuple[list[Measurement], list[str]]:
 
 def test_methods_run_in_turn(toy: tuple[list[Measurement], list[str]]) -> None:
     rounds = [line.rpartition(":")[0] for line in toy[1] if "round" in line]
-    assert rounds == [
-        "round 1 of 3: coarse",
-        "round 1 of 3: fine",
-        "round 1 of 3: stored",
-        "round 2 of 3: coarse",
-        "round 3 of 3: coarse",
-    ]
+    turns = ("1 of 3: coarse", "1 of 3: fine", "1 of 3: stored", "2 of 3: coarse", "3 of 3: coarse")
+    assert rounds == [f"round {turn}" for turn in turns]
 
 
 def test_measurements_hold_times_errors_work_and_memory(
     toy: tuple[list[Measurement], list[str]],
 ) -> None:
+    one = Measurement("one", cpu_s=(4.0, 8.0, 6.0))
+    assert [one.seconds, one.spread] == pytest.approx([6.0, 1 / 3])
+    found = errors({"u": np.array([3.0, 4.4]), "extra": np.ones(1)}, {"u": np.array([3.0, 4.0])})
+    assert found == {"u": pytest.approx(0.08)}
     coarse, fine, stored = toy[0]
     assert (len(coarse.cpu_s), len(fine.cpu_s)) == (3, 1)
     assert coarse.error("loss") == pytest.approx(8.3e-4, rel=0.01)
@@ -75,12 +69,6 @@ def test_measurements_hold_times_errors_work_and_memory(
     assert stored.error("loss") == 0.0
     assert not stored.cpu_s
     assert np.isnan(stored.peak_mib)
-
-
-def test_median_and_spread() -> None:
-    one = Measurement("one", cpu_s=(4.0, 8.0, 6.0))
-    assert one.seconds == 6.0
-    assert one.spread == pytest.approx(1 / 3)
 
 
 @pytest.mark.parametrize(
@@ -105,23 +93,14 @@ def test_without_a_reference_nothing_is_measured() -> None:
         measured(broken)
 
 
-def test_targets_are_met_missed_or_not_measured(toy: tuple[list[Measurement], list[str]]) -> None:
+def test_targets_and_the_table_are_told(toy: tuple[list[Measurement], list[str]]) -> None:
     verdicts = [verdict for *_, verdict in toy_benchmark.suite().verdicts(toy[0])]
     assert verdicts == ["met", "missed", "met", "not measured"]
-
-
-@pytest.mark.parametrize(
-    ("target", "line"),
-    [
+    for target, line in (
         (Target("time", lambda _: 0.25, "s", at_most=0.8, aim=0.3), "<= 0.8 (aim 0.3): met"),
         (Target("faster", lambda _: 150.0, at_least=200), "150, target >= 200: missed"),
-    ],
-)
-def test_target_lines(target: Target, line: str) -> None:
-    assert line in text_table.target_line(target, *target.verdict({}))
-
-
-def test_the_table_is_aligned(toy: tuple[list[Measurement], list[str]]) -> None:
+    ):
+        assert line in text_table.target_line(target, *target.verdict({}))
     lines = text_table.table(toy[0]).splitlines()
     assert lines[0].split()[:3] == ["candidate", "time", "s"]
     assert "loss err" in lines[0]
@@ -147,15 +126,9 @@ def test_measurements_are_stored_and_stand_in_for_a_baseline(
     stored = MeasuringLimits(1, skipped=suite.baselines, stored=again)
     found = suite.measure(stored, lambda _: None)
     assert isinstance(found, list)
-    assert "fine: scaled; NOT measured now, figures of 2026-01-01" in text_table.text(
-        suite, found, ABOUT
-    )
+    told = text_table.text(suite, found, ABOUT)
+    assert "fine: scaled; NOT measured now, figures of 2026-01-01" in told
     assert storage.stored_measurements(tmp_path / "none.nc", suite.baselines) == {}
-
-
-def test_errors_are_relative() -> None:
-    found = errors({"u": np.array([3.0, 4.4]), "extra": np.ones(1)}, {"u": np.array([3.0, 4.0])})
-    assert found == {"u": pytest.approx(0.08)}
 
 
 def climbed(
@@ -182,15 +155,12 @@ def test_every_setting_is_measured_and_stored_with_units(tmp_path: Path) -> None
     assert read["own"].values.tolist() == [1, 1, 0]
 
 
-def test_what_takes_too_long_is_ended_and_nothing_tighter_is_tried() -> None:
+def test_what_takes_too_long_is_ended_what_fails_is_told_and_others_go_on() -> None:
     settings = (("a", 0.0), ("b", 1.0), ("c", 2.0))
     fast, slow, never = climbed(toy_benchmark.slow_at_setting, settings)
     assert fast.cpu_s
     assert slow.failure == "took longer than 0.5 s"
     assert never.failure == "not tried: b took longer than 0.5 s"
-
-
-def test_a_setting_that_fails_does_not_end_the_others() -> None:
     failed, fine = climbed(toy_benchmark.fails_at_first, (("a", 0.0), ("b", 11.0)))
     assert failed.failure == "ArithmeticError: too loose"
     assert fine.cpu_s
@@ -228,16 +198,14 @@ def test_more_than_15_percent_is_told(seconds: float, error: float, lines: list[
     before = recorded(1.0, 1e-3, yard=0.5)
     # the second machine is half as fast: its seconds are twice as many
     assert comparison.worse(recorded(seconds, error, yard=1.0), before) == lines
+    rounding = recorded(1.0, 1e-14, 1.0), recorded(1.0, 1e-16, 1.0)
+    assert comparison.worse(*rounding) == []
 
 
 def recorded(seconds: float, error: float, yard: float) -> comparison.Record:
     misses = {"loss@a": error, "loss@b": error / 2}
     made = [Measurement("coarse", cpu_s=(seconds,), errors=misses), Measurement("x", failure="no")]
     return comparison.record(made, ABOUT, yard)
-
-
-def test_rounding_is_no_loss_of_accuracy() -> None:
-    assert comparison.worse(recorded(1.0, 1e-14, 1.0), recorded(1.0, 1e-16, 1.0)) == []
 
 
 def test_a_record_is_kept_with_machine_and_commit(tmp_path: Path) -> None:

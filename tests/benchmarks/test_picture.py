@@ -8,13 +8,8 @@ from reports.base import style
 
 def test_the_tables_are_read_whole() -> None:
     found = tables(PAGE.read_text(encoding="utf-8"))
-    assert {name: len(rows) for name, rows in found.items()} == {
-        "fig2": 4,
-        "fig4": 3,
-        "precision": 7,
-        "warm": 2,
-        "static": 6,
-    }
+    wanted = {"fig2": 4, "fig4": 3, "precision": 7, "warm": 2, "static": 6}
+    assert {name: len(rows) for name, rows in found.items()} == wanted
     assert found["fig2"][0] == TableRow("ours", 0.443, 3.9e-05)
 
 

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,24 +44,20 @@ def refused(message: str) -> list[Check]:
 
 
 @pytest.mark.parametrize(
-    ("attempt", "verdict"),
+    ("attempt", "wanted", "verdict"),
     [
-        (lambda: found(1.0), "solved"),
-        (lambda: found(1.1), "wrong"),
-        (lambda: found(np.nan), "wrong"),
-        (lambda: refused("it jams; try a smaller load"), "refused"),
-        (lambda: refused("it jams"), "wrong"),
-        (lambda: [Check("none", 1 / 0, 1.0)], "wrong"),
+        (lambda: found(1.0), "solution", "solved"),
+        (lambda: found(1.1), "solution", "wrong"),
+        (lambda: found(np.nan), "solution", "wrong"),
+        (lambda: refused("it jams; try a smaller load"), "solution", "refused"),
+        (lambda: refused("it jams"), "solution", "wrong"),
+        (lambda: [Check("none", 1 / 0, 1.0)], "solution", "wrong"),
+        (lambda: found(0.0), "refusal", "wrong"),
+        (lambda: refused("there is none; try another"), "refusal", "refused"),
     ],
 )
-def test_verdicts(attempt: Callable[[], list[Check]], verdict: str) -> None:
-    assert attempted(StressCase("toy", attempt)).verdict == verdict
-
-
-def test_an_answer_to_what_has_none_is_wrong() -> None:
-    assert attempted(StressCase("toy", lambda: found(0.0), "refusal")).verdict == "wrong"
-    refusal = StressCase("toy", lambda: refused("there is none; try another"), "refusal")
-    assert attempted(refusal).verdict == "refused"
+def test_verdicts(attempt: Callable[[], list[Check]], wanted: Any, verdict: str) -> None:  # noqa: ANN401
+    assert attempted(StressCase("toy", attempt, wanted)).verdict == verdict
 
 
 def test_only_what_a_study_may_ask_for_counts_as_in_range() -> None:
@@ -76,13 +73,9 @@ def test_only_what_a_study_may_ask_for_counts_as_in_range() -> None:
     assert tally.in_range == (3, 2)
     assert tally.counts == {"solved": 2, "refused": 3}
     assert tally.worst == found(0.5)
-
-
-def test_the_worst_of_all_answers_is_shown() -> None:
     beyond = [[Check("beyond, deg", value, 0.0)] for value in (-2.0, -0.5, -1.0)]
     cases = [StressCase("toy", lambda made=made: made) for made in beyond]  # type: ignore[misc]
-    tally = Tally(StressFamily("toy", "", "", lambda _: ()), tuple(map(attempted, cases)))
-    assert tally.worst == beyond[1]
+    assert Tally(family, tuple(map(attempted, cases))).worst == beyond[1]
 
 
 def values_of(made: list[Check]) -> dict[str, Check]:
@@ -173,9 +166,6 @@ def test_a_wrong_answer_fails_the_suite(
     monkeypatch.setattr(suite, "FAMILIES", {"toy": family})
     assert suite.main(["--out", str(tmp_path / "stress.json")]) == 1
     assert "wrong: toy: bad: error: 2, limit 1" in capsys.readouterr().out
-
-
-def test_an_unknown_family_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert suite.main(["tides"]) == 2
     assert "no family tides" in capsys.readouterr().err
 

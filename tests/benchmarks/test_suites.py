@@ -61,13 +61,10 @@ def test_a_case_does_not_depend_on_those_after_it() -> None:
     np.testing.assert_array_equal(alone.values["loss"], three.values["loss"])
 
 
-def test_counts_of_variables() -> None:
+def test_counts_of_variables_and_the_direction_of_one_case() -> None:
     assert paper_scenes.fig2().space.n_variables == 304
     assert paper_scenes.fig2(symmetry="C4").space.n_variables == 76
     assert paper_scenes.fig4().space.n_variables == 280
-
-
-def test_one_case_keeps_its_direction() -> None:
     (motion,) = paper_scenes.one_case(paper_scenes.fig2(), 135.0).loads.motions
     assert isinstance(motion, Harmonic)
     assert float(motion.direction) == pytest.approx(np.deg2rad(135.0))

@@ -10,6 +10,7 @@ from selenium.webdriver.support.ui import Select
 from reports.figures.study_report import study_report
 from reports.page import publish
 from tests.clients.conftest import Open
+from tests.clients.test_player import scrub
 from tests.reports import compressed_study
 
 
@@ -29,10 +30,7 @@ def browser(browse: Open, page: Path) -> Chrome:
 def test_it_shows_three_structures_under_load_without_complaint(browser: Chrome) -> None:
     captions = browser.find_elements(By.CSS_SELECTOR, "#player figcaption")
     assert [caption.text for caption in captions] == ["Intact", "Voided", "Cloaked"]
-    browser.execute_script(
-        "const slider = document.querySelector('#player input');"
-        "slider.value = 10000; slider.dispatchEvent(new Event('input'));"
-    )
+    scrub(browser, 1.0)
     output = browser.find_element(By.CSS_SELECTOR, "#player output")
     assert output.text == "u = 15.0 mm"
     assert not browser.get_log("browser")  # type: ignore[no-untyped-call]

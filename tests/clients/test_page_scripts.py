@@ -15,6 +15,7 @@ from reports.page import rendered
 from reports.panels import Animation, AnimationAxis, AnimationClip, ColourField, payload
 from reports.study import from_dataset
 from tests.clients.conftest import Open
+from tests.clients.test_player import at, scrub
 from tests.reports import shaken_study
 
 LOST = 8
@@ -48,18 +49,13 @@ def browser(browse: Open, page: Path) -> Chrome:
     return browse(page, 800, 600, 1.0)
 
 
-def load(browser: Chrome) -> float:
-    player = browser.find_element(By.ID, "player")
-    return float(player.get_attribute("data-at") or "nan")
-
-
 def test_it_plays_to_the_last_load_and_stops(browser: Chrome) -> None:
     button = browser.find_element(By.CSS_SELECTOR, "#player .play")
     button.click()
     WebDriverWait(browser, 10).until(lambda _: button.text == "Play")
-    assert load(browser) == pytest.approx(5.0)
+    assert at(browser) == pytest.approx(5.0)
     button.click()
-    assert load(browser) < 5.0
+    assert at(browser) < 5.0
 
 
 def test_there_is_no_menu_for_a_single_case(browser: Chrome) -> None:
@@ -68,18 +64,12 @@ def test_there_is_no_menu_for_a_single_case(browser: Chrome) -> None:
 
 
 def test_the_slider_runs_over_uneven_loads(browser: Chrome) -> None:
-    browser.execute_script(
-        "const slider = document.querySelector('#player input');"
-        "slider.value = 5000; slider.dispatchEvent(new Event('input'));"
-    )
-    assert load(browser) == pytest.approx(2.5)
+    scrub(browser, 0.5)
+    assert at(browser) == pytest.approx(2.5)
 
 
 def test_a_lost_unit_stays_blank(browser: Chrome) -> None:
-    browser.execute_script(
-        "const slider = document.querySelector('#player input');"
-        "slider.value = 10000; slider.dispatchEvent(new Event('input'));"
-    )
+    scrub(browser, 1.0)
     colours = browser.execute_script(
         """
         const canvas = document.querySelector("#player .stage canvas");

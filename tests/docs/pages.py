@@ -46,10 +46,9 @@ class Command:
     @property
     def targets(self) -> list[str]:
         """What make or Snakemake is asked for."""
+        given = self.words[1:]
         return [
-            word
-            for word in self.words[1:]
-            if not (word.startswith("-") or _VARIABLE.fullmatch(word))
+            each for each in given if not each.startswith("-") and not _VARIABLE.fullmatch(each)
         ]
 
 

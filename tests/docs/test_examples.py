@@ -20,22 +20,23 @@ from tests.docs.walk import LAID_OVER, check_recording, checked
 FAQ = blocks("docs/faq.md")
 
 
-def yaml_of(page: str) -> list[Block]:
-    """The examples of a page."""
-    return [block for block in blocks(page) if block.language == "yaml"]
+def each_yaml_of(page: str) -> pytest.MarkDecorator:
+    """Parametrises a test by the examples of a page."""
+    found = [block for block in blocks(page) if block.language == "yaml"]
+    return pytest.mark.parametrize("block", found, ids=lambda block: block.text[:60])
 
 
-MISTAKES = [
-    (block, told)
-    for block, told in pairwise(FAQ)
-    if (block.language, told.language) == ("yaml", "text")
-]
+@pytest.fixture
+def problem(tmp_path: Path) -> Path:
+    return tmp_path / "problem.yaml"
+
+
+MISTAKES = [each for each in pairwise(FAQ) if [one.language for one in each] == ["yaml", "text"]]
 
 
 @pytest.mark.parametrize(("block", "told"), MISTAKES, ids=lambda each: each.text[:60])
-def test_a_mistake_is_told_as_the_page_says(block: Block, told: Block, tmp_path: Path) -> None:
+def test_a_mistake_is_told_as_the_page_says(block: Block, told: Block, problem: Path) -> None:
     shown = block.place.removeprefix(LAID_OVER)
-    problem = tmp_path / "problem.yaml"
     shutil.copy(ROOT / shown, problem)
     with pytest.raises(UserError) as caught:
         checked(block, problem)
@@ -43,11 +44,10 @@ def test_a_mistake_is_told_as_the_page_says(block: Block, told: Block, tmp_path:
     assert f"  file:   {shown}, line " in told.text
 
 
-@pytest.mark.parametrize("block", yaml_of("docs/loads.md"), ids=lambda each: each.text[:60])
-def test_drives_are_as_the_page_says(block: Block, tmp_path: Path) -> None:
+@each_yaml_of("docs/loads.md")
+def test_drives_are_as_the_page_says(block: Block, problem: Path) -> None:
     (series,) = [each.text for each in blocks("docs/loads.md") if each.language == "text"]
-    (tmp_path / "shaker.csv").write_text(series)
-    problem = tmp_path / "problem.yaml"
+    problem.with_name("shaker.csv").write_text(series)
     shutil.copy(ROOT / block.place.removeprefix(LAID_OVER), problem)
     checked(block, problem)
 
@@ -65,19 +65,14 @@ def test_a_message_within_a_sentence_is_the_codes(phrase: str, module: ModuleTyp
     assert phrase in inspect.getsource(module)
 
 
-@pytest.mark.parametrize(
-    "block",
-    [block for block in blocks("docs/tracking.md") if block.language == "yaml"],
-    ids=lambda block: block.place,
-)
+@each_yaml_of("docs/tracking.md")
 def test_a_recording_is_valid(block: Block, tmp_path: Path) -> None:
     check_recording(block, tmp_path)
 
 
-def test_the_workshops_keys_are_valid(tmp_path: Path) -> None:
-    problem = tmp_path / "problem.yaml"
+@each_yaml_of("docs/printer.md")
+def test_the_workshops_keys_are_valid(block: Block, problem: Path) -> None:
     shutil.copy(ROOT / "experiments/fig5/problem.yaml", problem)
-    (block,) = (block for block in blocks("docs/printer.md") if block.language == "yaml")
     checked(block, problem)
 
 
@@ -89,19 +84,17 @@ def test_the_paper_is_cited_as_in_the_citation_file() -> None:
             assert value in cited, line
 
 
-@pytest.mark.parametrize("block", yaml_of("docs/sweeps.md"), ids=lambda block: block.place)
-def test_a_sweep_is_valid(block: Block, tmp_path: Path) -> None:
-    problem = tmp_path / "problem.yaml"
+@each_yaml_of("docs/sweeps.md")
+def test_a_sweep_is_valid(block: Block, problem: Path) -> None:
     (section,) = yaml.safe_load(block.text).items()
     whole = yaml.safe_load((ROOT / block.place).read_text())
     problem.write_text(yaml.safe_dump(whole | dict([section])))
     assert getattr(load(problem), section[0]) is not None
 
 
-@pytest.mark.parametrize("block", yaml_of("docs/robust.md"), ids=lambda block: block.text[30:60])
-def test_what_a_design_is_to_hold_against_is_valid(block: Block, tmp_path: Path) -> None:
+@each_yaml_of("docs/robust.md")
+def test_what_a_design_is_to_hold_against_is_valid(block: Block, problem: Path) -> None:
     """Laid over the file, as a preset is; a preset by itself is loaded as one."""
-    problem = tmp_path / "problem.yaml"
     given = yaml.safe_load(block.text)
     preset = next(iter(given.get("presets", {})), None)
     whole = yaml.safe_load((ROOT / block.place).read_text())

@@ -16,15 +16,8 @@ LOADED = re.compile(r"<(?:script|link|img|iframe)\b[^>]*?\b(?:src|href)=\"?([^\"
 
 def test_the_site_is_whole_and_offline(tmp_path: Path) -> None:
     mkdocs = Path(sys.executable).with_name("mkdocs")
-    built = subprocess.run(
-        [str(mkdocs), "build", "--quiet", "--strict", "--site-dir", str(tmp_path / "site")],
-        cwd=ROOT,
-        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert built.returncode == 0, built.stdout + built.stderr
+    words = [str(mkdocs), *["build", "--quiet", "--strict", "--site-dir"], str(tmp_path / "site")]
+    subprocess.run(words, cwd=ROOT, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"}, check=True)
     for page in PAGES[1:]:
         html = (tmp_path / "site" / Path(page).name).with_suffix(".html")
         loaded = LOADED.findall(html.read_text(encoding="utf-8"))

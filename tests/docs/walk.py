@@ -40,10 +40,7 @@ class Reader:
         return cls(checkout, draft)
 
     def told(self, page: str) -> str:
-        """Does what a page says; all that its commands and scripts then say themselves.
-
-        A block before a message that begins with `error:` has to fail, every other to succeed.
-        """
+        """Does what a page says, of which all but what stands before an `error:` succeeds."""
         said = ""
         for block, ended in self._read(page):
             wrong = (ended.returncode != 0) != is_mistake(block)
@@ -61,10 +58,7 @@ class Reader:
                 self._write(block)
 
     def _meant(self, words: str) -> str:
-        """The text with the draft in the place of the study, and recordings planned only.
-
-        These are all substitutions that there are.
-        """
+        """The text with the draft in the place of the study, and recordings planned only."""
         if not self.draft:
             return words
         meant = words.replace("results/logo/", "results/logo@quick/")
@@ -87,11 +81,7 @@ def is_mistake(block: Block) -> bool:
 
 
 def checked(block: Block, problem: Path) -> None:
-    """Checks a problem file with the keys of a block laid over it.
-
-    Raises:
-        UserError: as for any problem file.
-    """
+    """Checks a problem file with the keys of a block laid over it."""
     changed = problem.with_name("changed.yaml")
     asked = overlay_keys(yaml.safe_load(problem.read_text()), yaml.safe_load(block.text))
     changed.write_text(yaml.safe_dump(asked, sort_keys=False))
@@ -102,11 +92,7 @@ def checked(block: Block, problem: Path) -> None:
 
 
 def check_recording(block: Block, folder: Path) -> None:
-    """Checks the YAML of a recording, or of points, that a page shows.
-
-    Raises:
-        UserError: as for any such file.
-    """
+    """Checks the YAML of a recording, or of points, that a page shows."""
     path = folder / block.place
     path.write_text(block.text)
     if "points" in yaml.safe_load(block.text):

@@ -19,31 +19,23 @@ import yaml
 from pipeline.runtime import ROOT, RUN_MARK
 
 STUDY = "tiny"
-SMALLER = {
-    "title": "A small study",
-    "lattice": {"columns": 5, "rows": 5},
-    "cloak": {"disc": {"radius": "22 mm"}},
-    "drive": {"amplitude": "2 mm", "directions": ["0 deg", "45 deg"], "weights": [0.5, 0.5]},
-    "horizon": {"periods": 1, "samples": 20},
-    "optimiser": {"methods": {"sqp": {"evaluations": 12}, "mma": {"evaluations": 12}}},
-    "solver": {"accuracy": "draft"},
-    "response": {"cycles": 1, "samples": 21},
-    "sweep": {"grid": {"drive.directions": {"points": 3}, "drive.frequency": {"points": 2}}},
-    "report": {"measured_constants": None, "as_built": False},
-    "presets": {},
-}
+SMALLER = yaml.safe_load("""
+title: A small study
+lattice: { columns: 5, rows: 5 }
+cloak: { disc: { radius: 22 mm } }
+drive: { amplitude: 2 mm, directions: [0 deg, 45 deg], weights: [0.5, 0.5] }
+horizon: { periods: 1, samples: 20 }
+optimiser: { methods: { sqp: { evaluations: 12 }, mma: { evaluations: 12 } } }
+solver: { accuracy: draft }
+response: { cycles: 1, samples: 21 }
+sweep: { grid: { drive.directions: { points: 3 }, drive.frequency: { points: 2 } } }
+report: { measured_constants: null, as_built: false }
+presets: {}
+""")
 ROOMS = ("benchmarks", "experiments", "metacloak", "pipeline", "profiles", "reports", "sim")
 FILES = (
-    "Snakefile",
-    "Makefile",
-    "CITATION.cff",
-    "LICENSE",
-    "README.md",
-    "pyproject.toml",
-    "setup.py",
-    "requirements.lock",
-    "requirements-dev.lock",
-    ".gitignore",
+    *("Snakefile", "Makefile", "CITATION.cff", "LICENSE", "README.md", "pyproject.toml"),
+    *("setup.py", "requirements.lock", "requirements-dev.lock", ".gitignore"),
 )
 _CACHES = ("NUMBA_CACHE_DIR", "JAX_COMPILATION_CACHE_DIR", "MPLCONFIGDIR")
 _NOBODYS = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull}

@@ -13,34 +13,27 @@ import yaml
 from pipeline.problem.reading import overlay_keys
 from tests.e2e.checkout import Checkout
 
-RECORDING = {
-    "title": "A small specimen",
-    "structure": "cloaked",
-    "specimen": "bare",
-    "pixel_size": "0.4 mm",
-    "virtual": {
-        "rate": "30 Hz",
-        "camera": {"image": [256, 256], "pixel_size": "0.4 mm"},
-        "codec": {"name": "h264", "crf": 14},
-    },
-}
-SMALLEST = {
-    "optimiser": {"methods": {"sqp": {"evaluations": 4}, "mma": None}},
-    "prediction": {"samples": 2},
-    "sweep": {"grid": {"drive.directions": {"points": 2}, "drive.frequency": {"points": 2}}},
-}
+RECORDING = """
+title: A small specimen
+structure: cloaked
+specimen: bare
+pixel_size: 0.4 mm
+virtual:
+  rate: 30 Hz
+  camera: { image: [256, 256], pixel_size: 0.4 mm }
+  codec: { name: h264, crf: 14 }
+"""
+SMALLEST = yaml.safe_load("""
+optimiser: { methods: { sqp: { evaluations: 4 }, mma: null } }
+prediction: { samples: 2 }
+sweep: { grid: { drive.directions: { points: 2 }, drive.frequency: { points: 2 } } }
+""")
 NOT_RESULTS = ("logs", ".journal")
 
 
 @dataclass(frozen=True)
 class Kill:
-    """Records one end of a run.
-
-    Attributes:
-        after: seconds since its start.
-        writing: files that were being written.
-        at_work: the newest log: the stage that was at work.
-    """
+    """One end of a run: seconds after its start, files being written, the newest log's stage."""
 
     after: float
     writing: tuple[str, ...]
@@ -54,7 +47,7 @@ def filmed(checkout: Checkout) -> Checkout:
     checkout.problem.write_text(yaml.safe_dump(asked, sort_keys=False), encoding="utf-8")
     folder = checkout.problem.parent / "recordings"
     folder.mkdir(exist_ok=True)
-    (folder / "cloaked.yaml").write_text(yaml.safe_dump(RECORDING), encoding="utf-8")
+    (folder / "cloaked.yaml").write_text(RECORDING, encoding="utf-8")
     return checkout
 
 

@@ -25,13 +25,7 @@ SILENT = (
 
 @dataclass(frozen=True)
 class Tried:
-    """Records one attempt.
-
-    Attributes:
-        place: what was wrong with it.
-        what: what was attempted there.
-        fault: what went wrong; empty where it was survived.
-    """
+    """One attempt: what was wrong with the place, what was tried, and what went wrong, if any."""
 
     place: str
     what: str

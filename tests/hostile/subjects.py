@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import cv2
 import numpy as np
+from pydantic import BaseModel
 
 from pipeline import datasets
 from pipeline.calibration.inputs import Calibration
@@ -34,6 +35,7 @@ from tests.pipeline.samples import sample
 Sort = Literal["YAML", "netCDF", "CSV", "image", "SVG", "DXF", "video", "other"]
 Told = list[Any]
 """What was read, as plain numbers and words."""
+Make = Callable[[Path], Path]
 
 EXPERIMENTS = ROOT / "experiments"
 CLIP = ROOT / "tests/data/tracking/f_silhouette"
@@ -56,25 +58,15 @@ PICTURED = "void: { image: { file: {name}, width: 16 mm } }"
 
 @dataclass(frozen=True)
 class Subject:
-    """Names a kind of file.
-
-    Attributes:
-        name: what it is.
-        sort: of the file.
-        make: writes a good one, with what belongs to it, into a folder; returns its path.
-        read: reads it as the stages do.
-        damages: what may befall it besides what may befall any file.
-        sealed: whether what it holds is the project's own, which no damage may change unseen.
-        whole: whether nothing of it may be missing, either.
-    """
+    """A kind of file, a good one of which `make` writes into a folder, with what belongs to it."""
 
     name: str
-    sort: Sort
-    make: Callable[[Path], Path]
+    make: Make
     read: Callable[[Path], Told]
-    damages: Damages = ()
-    sealed: bool = False
-    whole: bool = True
+    sort: Sort = "other"
+    damages: Damages = ()  # besides what may befall any file
+    sealed: bool = False  # the project's own, which no damage may change unseen
+    whole: bool = True  # nothing of it may be missing, either
 
 
 def _text(name: str, text: str, folder: Path) -> Path:
@@ -101,7 +93,7 @@ def _figure(folder: Path) -> Path:
     return _copied(EXPERIMENTS / "fig6/figure.yaml", study)
 
 
-def _beside(make: Callable[[Path], Path], named: Callable[[str], str], folder: Path) -> Path:
+def _beside(make: Make, named: Callable[[str], str], folder: Path) -> Path:
     """Writes a file that a problem names, and the problem."""
     path = make(folder)
     text = static.write(folder, static.HOLE, size=5).read_text(encoding="utf-8")
@@ -156,7 +148,7 @@ def _frames(folder: Path) -> Path:
     return shots / "2.png"
 
 
-def _film(name: str, codec: Codec, folder: Path) -> Path:
+def _filmed(name: str, codec: Codec, folder: Path) -> Path:
     path = folder / name
     noise = np.random.default_rng(0).integers(0, 255, (8, 96, 128), dtype=np.uint8)
     encode_video(path, iter(noise), 30.0, codec, {"title": "noise"})
@@ -198,8 +190,14 @@ def _known(path: Path) -> Told:
     return sorted(case_log.known(path.parent).items())
 
 
-def _yaml(name: str, make: Callable[[Path], Path], read: Callable[[Path], Told]) -> Subject:
-    return Subject(name, "YAML", make, read, damage.YAML)
+_yaml = partial(Subject, sort="YAML", damages=damage.YAML)
+_sheet = partial(Subject, sort="CSV", damages=damage.CSV)
+_netcdf = partial(Subject, sort="netCDF", damages=damage.NETCDF)
+_film = partial(Subject, read=_shown, sort="video")
+
+
+def _model(name: str, make: Make, read: Callable[[Path], BaseModel]) -> Subject:
+    return _yaml(name, make, lambda path: [read(path).model_dump_json()])
 
 
 def _described(path: Path) -> Told:
@@ -208,12 +206,9 @@ def _described(path: Path) -> Told:
     return [text, import_video.design(described)["vertices"].values.tolist()]
 
 
-def _sheet(name: str, make: Callable[[Path], Path], read: Callable[[Path], Told]) -> Subject:
-    return Subject(name, "CSV", make, read, damage.CSV)
-
-
-def _image(name: str, make: Callable[[Path], Path]) -> Subject:
-    return Subject(name, "image", partial(_beside, make, _void), _by_problem)
+def _drawn(name: str, sort: Sort, make: Make, named: Callable[[str], str] = _void) -> Subject:
+    damages = () if sort == "image" else damage.TEXT
+    return Subject(name, partial(_beside, make, named), _by_problem, sort, damages)
 
 
 def _forces(path: Path) -> Told:
@@ -233,7 +228,7 @@ def _readings(path: Path) -> Told:
     return list(csv_columns.read_quantities(path, wanted).tolist())
 
 
-def _from_study(name: str) -> Callable[[Path], Path]:
+def _from_study(name: str) -> Make:
     return partial(_copied, EXPERIMENTS / name)
 
 
@@ -241,76 +236,40 @@ SUBJECTS: tuple[Subject, ...] = (
     _yaml("problem, dynamic", _from_study("fig2/problem.yaml"), _problem),
     _yaml("problem, static", partial(static.write, more=static.HOLE, size=5), _problem),
     _yaml("problem, kagome", _from_study("kagome/problem.yaml"), _problem),
-    _yaml(
-        "recording",
-        _from_study("fig2/recordings/cloaked.yaml"),
-        lambda p: [recording.load_recording(p).model_dump_json()],
-    ),
-    _yaml(
+    _model("recording", _from_study("fig2/recordings/cloaked.yaml"), recording.load_recording),
+    _model(
         "calibration",
         _from_study("calibration/hinges.yaml"),
-        lambda p: [load_section(p, Calibration).model_dump_json()],
+        lambda p: load_section(p, Calibration),
     ),
-    _yaml(
-        "points",
-        partial(_text, "points.yaml", POINTS),
-        lambda p: [dic_points.load(p).model_dump_json()],
-    ),
+    _model("points", partial(_text, "points.yaml", POINTS), dic_points.load),
     _yaml("description of a video", partial(_copied, CLIP.with_suffix(".yaml")), _described),
-    _yaml(
-        "figure of several studies",
-        _figure,
-        lambda p: [joint_figure.load_joint_figure(p).model_dump_json()],
-    ),
+    _model("figure of several studies", _figure, joint_figure.load_joint_figure),
     *(
-        Subject(
-            f"{kind} dataset",
-            "netCDF",
-            partial(_dataset, kind),
-            partial(_read_dataset, kind),
-            damage.NETCDF,
-            sealed=True,
+        _netcdf(
+            f"{kind} dataset", partial(_dataset, kind), partial(_read_dataset, kind), sealed=True
         )
         for kind in TABLES
     ),
-    Subject(
-        "lattice in netCDF",
-        "netCDF",
-        partial(_beside, partial(_lattice, "nc"), _listed),
-        _by_problem,
-        damage.NETCDF,
-    ),
+    _netcdf("lattice in netCDF", partial(_beside, partial(_lattice, "nc"), _listed), _by_problem),
     _sheet("lattice in CSV", partial(_beside, partial(_lattice, "csv"), _listed), _by_problem),
     _sheet("measured drive", partial(_beside, _motion, _driven), _by_problem),
     _sheet("load cell", partial(_text, "load.csv", LOG), _forces),
     _sheet("points", partial(_text, "dic.csv", DIC), _cloud),
     _sheet("calibration test", partial(_text, "test.csv", TEST), _readings),
-    Subject("journal of a sweep", "CSV", _cases, _known, damage.CSV, sealed=True, whole=False),
+    _sheet("journal of a sweep", _cases, _known, sealed=True, whole=False),
     *(
-        _image(f"{end} of a void", partial(_picture, f"void.{end}"))
+        _drawn(f"{end} of a void", "image", partial(_picture, f"void.{end}"))
         for end in ("png", "jpg", "bmp", "tiff")
     ),
-    Subject(
-        "SVG of a void",
-        "SVG",
-        partial(_beside, partial(_text, "void.svg", SVG), _void),
-        _by_problem,
-        damage.TEXT,
-    ),
-    Subject("picture of a film", "image", _frames, lambda p: _shown(p.parent)),
-    Subject("video, H.264", "video", partial(_copied, CLIP.with_suffix(".mp4")), _shown),
-    Subject("video, lossless", "video", partial(_film, "film.mkv", Codec(name="ffv1")), _shown),
-    Subject("video, small", "video", partial(_film, "film.mp4", Codec()), _shown),
-    Subject(
-        "lattice in DXF",
-        "DXF",
-        partial(_beside, partial(_lattice, "dxf"), _listed),
-        _by_problem,
-        damage.TEXT,
-    ),
+    _drawn("SVG of a void", "SVG", partial(_text, "void.svg", SVG)),
+    Subject("picture of a film", _frames, lambda p: _shown(p.parent), "image"),
+    _film("video, H.264", partial(_copied, CLIP.with_suffix(".mp4"))),
+    _film("video, lossless", partial(_filmed, "film.mkv", Codec(name="ffv1"))),
+    _film("video, small", partial(_filmed, "film.mp4", Codec())),
+    _drawn("lattice in DXF", "DXF", partial(_lattice, "dxf"), _listed),
     Subject(
         "manifest of a package",
-        "other",
         partial(_text, MANIFEST_FILE, MANIFEST_TEXT),
         lambda p: [sorted(map(str, read_manifest(p.parent).items()))],
     ),

@@ -29,6 +29,7 @@ from pipeline.stages.verify import variants
 from reports.study import StudyResults, study_results
 from sim.structure import Lattice
 from tests.pipeline import static
+from tests.pipeline.samples import filled
 
 ROBUSTNESS = "robustness: { samples: 5 }\n"
 PAPER = (
@@ -61,9 +62,8 @@ def written(folder: Path, more: str) -> StudyResults:
         files[kind] = folder / f"{kind}.nc"
         stage = REPORTED[kind]
         plan: dict[str, object] = {name: {"skipped": []} for name in names(chosen)}
-        posed = (
-            law_comparison.under(chosen, "geometric") if kind == "geometric_response" else chosen
-        )
+        again = kind == "geometric_response"
+        posed = law_comparison.under(chosen, "geometric") if again else chosen
         about = provenance.of_study(posed, stage.name, plan=plan)
         datasets.write(made[kind], files[kind], cast(Kind, stage.kind), about)
     return study_results.load(path, None, files)
@@ -138,31 +138,23 @@ def response(chosen: Problem, path: Path) -> xr.Dataset:
     for k, name in enumerate(lattices):
         force[k, :, :, driven] = 0.0
         force[k, 0, :, driven, 0] = -FORCE[name] * time / driven.sum()
-    filled = _filled("response", motion.shape)
+    sizes = dict(zip(("structure", "case", "time", "unit", "dof"), motion.shape, strict=True))
+    sizes |= {"xy": 2, "contact_law": 2, "snap_number": 1, "traced_point": 1}
+    absent = ("snap", "snap_load", "loss_other_branch", "traced_load", "traced_eigenvalue")
+    nothing = dict.fromkeys((*absent, "traced_force"), np.nan)
     drive = np.zeros((1, len(time), 2))
     drive[0, :, 0] = -_amplitude(chosen) * time
     loss = np.array([[LOSS[name]] for name in lattices])
-    untraced: dict[str, tuple[int, ...]] = {
-        **dict.fromkeys(("snap_load", "traced_load", "traced_eigenvalue"), ()),
-        "traced_force": (2,),
-    }
     shapes = [spread(each.padded(each.vertices), each, whole.n_units) for each in lattices.values()]
     return xr.Dataset(
-        filled
+        filled("response", sizes, 0.01, 1, velocity=0.0, **nothing)
         | variables
         | {
             "vertices": (("structure", "unit", "vertex", "xy"), np.stack(shapes)),
             "displacement": (TABLES["response"]["displacement"].dims, motion),
-            "velocity": (TABLES["response"]["velocity"].dims, 0.0 * motion),
             "reaction_force": (TABLES["response"]["reaction_force"].dims, force),
             "drive_displacement": (("case", "time", "xy"), drive),
             "loss": (("structure", "case"), loss),
-            "loss_other_branch": (("structure", "case"), np.full(loss.shape, np.nan)),
-            "snap": (("structure", "case", "time"), np.full(motion.shape[:3], np.nan)),
-            **{
-                name: (TABLES["response"][name].dims, np.full((*loss.shape, 1, *more), np.nan))
-                for name, more in untraced.items()
-            },
         },
         unit_coordinates(whole)
         | {
@@ -175,18 +167,6 @@ def response(chosen: Problem, path: Path) -> xr.Dataset:
             "contact_law": ["angle", "geometric"],
         },
     )
-
-
-def _filled(kind: Kind, shape: tuple[int, ...]) -> dict[str, Any]:
-    """Every variable of a kind on (structure, case, time, ...) with a small constant."""
-    sizes = dict(zip(("structure", "case", "time", "unit", "dof"), shape, strict=True))
-    sizes |= {"xy": 2, "contact_law": 2}
-    return {
-        name: (variable.dims, np.full([sizes[dim] for dim in variable.dims], value))
-        for name, variable in TABLES[kind].items()
-        if not variable.coordinate and set(variable.dims) <= set(sizes)
-        for value in [1 if variable.dtype.startswith("int") else 0.01]
-    }
 
 
 def _amplitude(chosen: Problem) -> float:
@@ -231,13 +211,7 @@ def scatter(chosen: Problem) -> xr.Dataset:
 
 def verification(chosen: Problem) -> xr.Dataset:
     checks, structures = list(variants(chosen)), names(chosen)
-    size, dims = (len(checks), len(structures)), ("check", "structure")
-    variables = {
-        name: (dims, np.full(size, 0 if variable.dtype == "int64" else 0.05))
-        for name, variable in TABLES["verification"].items()
-        if variable.dims == dims
-    }
+    variables = filled("verification", {"check": len(checks), "structure": len(structures)}, 0.05)
     status = np.array(["ok"] * (len(checks) - 1) + ["no equilibrium found"])
-    return xr.Dataset(
-        variables | {"status": ("check", status)}, {"check": checks, "structure": structures}
-    )
+    labels = {"check": checks, "structure": structures}
+    return xr.Dataset(variables | {"status": ("check", status)}, labels)

@@ -9,8 +9,9 @@ import xarray as xr
 
 from pipeline import datasets
 from pipeline.datasets import provenance
-from pipeline.datasets.tables import NETWORK, SCHEMAS, TABLES
+from pipeline.datasets.tables import NETWORK, SCHEMAS
 from reports.study import StudyResults
+from tests.pipeline.samples import filled
 
 GAIN = 1.1
 """Measured over simulated motion."""
@@ -49,7 +50,7 @@ def comparison(study: StudyResults, structure: str, case: int) -> xr.Dataset:
     turned = np.abs(simulated[..., 2]).mean(axis=1)
     along = np.stack([GAIN * turned, turned, turned])[..., None] * [1.0, 0.9, 1.1]
     spans = np.ptp(np.stack([measured, simulated, simulated]), axis=1)[..., None]
-    variables: dict[str, Any] = _filled(sizes) | {
+    variables: dict[str, Any] = filled("comparison", sizes, 0.5) | {
         "measured": (motion, measured),
         "simulated": (motion, simulated),
         "nominal": (motion, simulated),
@@ -71,18 +72,5 @@ def comparison(study: StudyResults, structure: str, case: int) -> xr.Dataset:
         "estimate": ["value", "low", "high"],
         "drive_displacement": (("time", "xy"), drive),
     }
-    told = dict.fromkeys(SCHEMAS["comparison"].attributes, "told") | {
-        "structure": structure,
-        "case": str(case),
-    }
-    return xr.Dataset(variables, coordinates, told)
-
-
-def _filled(sizes: dict[str, int]) -> dict[str, Any]:
-    """Every variable with a small constant."""
-    return {
-        name: (variable.dims, np.full([sizes[dim] for dim in variable.dims], value))
-        for name, variable in TABLES["comparison"].items()
-        if not variable.coordinate and set(variable.dims) <= set(sizes)
-        for value in [0 if variable.dtype.startswith("int") else 0.5]
-    }
+    told = dict.fromkeys(SCHEMAS["comparison"].attributes, "told")
+    return xr.Dataset(variables, coordinates, told | {"structure": structure, "case": str(case)})

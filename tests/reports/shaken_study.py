@@ -18,6 +18,7 @@ from pipeline.runtime import SweepResult
 from pipeline.stages import sweep as sweep_stage
 from reports.study import StudyResults, study_results
 from sim.structure import Lattice
+from tests.pipeline.samples import filled
 
 PROBLEM = Path(__file__).parents[2] / "experiments" / "fig2" / "problem.yaml"
 
@@ -27,6 +28,10 @@ REACH = {"altered": 1.0, "cloaked": 0.12}
 """Amplitude of the surroundings of each structure, of what the sheet would do."""
 
 LOSS_ERROR, SAMPLES = 3e-5, 0.995
+ABSENT = (
+    "reaction_force", "snap", "eigenvalue", "snap_load", "traced_load", "traced_force",
+    "traced_eigenvalue", "loss_other_branch",
+)  # fmt: skip
 KKT = {"sqp": 2e-4, "mma": 3e-2}
 
 
@@ -46,9 +51,8 @@ def written(folder: Path, preset: str | None = None) -> StudyResults:
     if chosen.report.as_built:
         files["built"] = folder / "built.nc"
         about = provenance.of_study(chosen, "as_built", plan={})
-        datasets.write(
-            datasets.read(files["response"], "response"), files["built"], "response", about
-        )
+        built = datasets.read(files["response"], "response")
+        datasets.write(built, files["built"], "response", about)
     return study_results.load(PROBLEM, preset, files)
 
 
@@ -64,9 +68,8 @@ def write(folder: Path, preset: str | None = None) -> tuple[Path, Path, Path]:
     chosen = problem.load(PROBLEM, preset)
     lattice = _lattice(chosen)
     paths = (folder / "design.nc", folder / "response.nc", folder / "sweep.nc")
-    datasets.write(
-        design(chosen, lattice), paths[0], "design", provenance.of_study(chosen, "design")
-    )
+    about = provenance.of_study(chosen, "design")
+    datasets.write(design(chosen, lattice), paths[0], "design", about)
     shared = ["simulation of the unloaded reference: it is zero"]
     plan = {
         "altered": {"integrator": "implicit", "skipped": [*shared, "2 of 4 load cases"]},
@@ -198,48 +201,23 @@ def response(chosen: Problem, lattice: Lattice) -> xr.Dataset:
     per_law = ("structure", "contact_law", "case")
     shapes = [lattice.padded(lattice.vertices), lattice.padded(cloaked(chosen, lattice))]
     n_cases = len(_drive(chosen).directions)
-    zeros = np.zeros(motion.shape[:3])
+    sizes = dict(zip((*per_time, "unit", "dof"), motion.shape, strict=True))
+    sizes |= {"xy": 2, "contact_law": 2, "snap_number": 1, "traced_point": 1}
+    constants: dict[str, Any] = dict.fromkeys(("gap", "min_gap", "gap_by_contact"), 0.08)
+    constants |= {"stability": -1, "loss_error": LOSS_ERROR, "displacement_error": 2e-3}
+    constants |= dict.fromkeys(ABSENT, np.nan)
     return xr.Dataset(
-        _flags(chosen)
+        filled("response", sizes, **constants)
+        | _flags(chosen)
         | _network(lattice)
         | {
             "vertices": (("structure", "unit", "vertex", "xy"), np.stack(shapes)),
             "displacement": ((*per_time, "unit", "dof"), motion),
             "velocity": ((*per_time, "unit", "dof"), np.gradient(motion, time, axis=2)),
-            "reaction_force": ((*per_time, "unit", "dof"), np.full(motion.shape, np.nan)),
-            "strain_energy": (per_time, zeros),
-            "contact_energy": (per_time, zeros),
-            "min_void_angle": (per_time, zeros + 0.2 - 0.1 * time),
-            "roi_energy": (per_time, zeros),
-            "contact_pairs": (per_time, zeros.astype(int)),
-            "max_stretch": (per_time, zeros),
-            "max_shear": (per_time, zeros),
-            "max_bend": (per_time, zeros),
-            "gap": (per_time, zeros + 0.08),
-            "overlapping": (per_time, zeros),
-            "stability": (per_time, np.full(zeros.shape, -1)),
-            "snap": (per_time, np.full(zeros.shape, np.nan)),
-            "eigenvalue": (per_time, np.full(zeros.shape, np.nan)),
-            "snap_load": ((*per_case, "snap_number"), np.full((*loss.shape, 1), np.nan)),
-            "traced_load": ((*per_case, "traced_point"), np.full((*loss.shape, 1), np.nan)),
-            "traced_force": (
-                (*per_case, "traced_point", "xy"),
-                np.full((*loss.shape, 1, 2), np.nan),
-            ),
-            "traced_eigenvalue": ((*per_case, "traced_point"), np.full((*loss.shape, 1), np.nan)),
-            "drive_displacement": (("case", "time", "xy"), np.zeros((*motion.shape[1:3], 2))),
-            "drive_force": ((*per_time, "xy"), np.zeros((*motion.shape[:3], 2))),
-            "min_gap": (per_case, np.full(loss.shape, 0.08)),
-            "overlaps": (per_case, np.zeros(loss.shape, int)),
+            "min_void_angle": (per_time, np.zeros(motion.shape[:3]) + 0.2 - 0.1 * time),
             "loss": (per_case, loss),
             "loss_samples": (per_case, SAMPLES * loss),
-            "loss_other_branch": (per_case, np.full(loss.shape, np.nan)),
-            "loss_error": (per_case, np.full(loss.shape, LOSS_ERROR)),
-            "displacement_error": (per_case, np.full(loss.shape, 2e-3)),
             "loss_by_contact": (per_law, np.stack([loss, loss], axis=1)),
-            "overlaps_by_contact": (per_law, np.zeros((len(loss), 2, n_cases))),
-            "gap_by_contact": (per_law, np.full((len(loss), 2, n_cases), 0.08)),
-            "snaps_by_contact": (per_law, np.zeros((len(loss), 2, n_cases))),
         },
         _labels(chosen, lattice)
         | {

@@ -47,14 +47,7 @@ Draw = Callable[[np.random.Generator], list[Experiment]]
 
 
 class Case(NamedTuple):
-    """What is found again and again.
-
-    Attributes:
-        asked: the calibration.
-        true: constants.
-        draw: experiments with noise.
-        known: some that know the noise, for the bound.
-    """
+    """A calibration, its true constants, draws of data with noise, and data that know theirs."""
 
     asked: Calibration
     true: Constants
@@ -73,21 +66,17 @@ def forces_case(folder: Path) -> Case:
         test = force_displacement.pose_force_test(each, begin, along, np.zeros(len(along)))
         clean.append((test, test.simulation.predict(true), each.virtual.noise))
 
+    def measured(test: force_displacement.ForceTest, name: str, values: Floats) -> Experiment:
+        given: dict[str, Any] = {name: values}
+        return replace(test, measured=replace(test.measured, **given))
+
     def draw(random: np.random.Generator) -> list[Experiment]:
         return [
-            replace(
-                test,
-                measured=replace(
-                    test.measured, values=force + noise * random.normal(size=len(force))
-                ),
-            )
+            measured(test, "values", force + noise * random.normal(size=len(force)))
             for test, force, noise in clean
         ]
 
-    known = [
-        replace(test, measured=replace(test.measured, sigma=np.full(len(force), noise)))
-        for test, force, noise in clean
-    ]
+    known = [measured(test, "sigma", np.full(len(force), noise)) for test, force, noise in clean]
     return Case(asked, true, draw, known)
 
 
@@ -109,31 +98,28 @@ def squeezed_case(folder: Path, noise: float = 1.0) -> Case:
     """Equilibria, which tell ratios of stiffness."""
     begin = {"bending_stiffness": "1.7 N mm/rad", "axial_stiffness": "100 N/mm"}
     error = {"displacement": f"{0.003 * noise} mm", "rotation": f"{0.02 * noise} deg"}
-    track = {
-        "problem": "squeezed.yaml",
-        "bias": error,
-        "virtual": {"rate": "6 Hz", "noise": error, "bias": error},
-    }
-    return _track_case(folder, track, TRUTH | begin, list(begin))
+    return _track_case(folder, "squeezed.yaml", "6 Hz", error, TRUTH | begin, list(begin))
 
 
 def shaken_case(folder: Path, noise: float = 1.0) -> Case:
     """A motion in time, which inertia slows down: it tells stiffness itself, and damping."""
     begin = {"shear_stiffness": "1.0 N/mm", "damping": {"ratio": 0.015}}
     error = {"displacement": f"{0.02 * noise} mm", "rotation": f"{0.1 * noise} deg"}
-    track = {
-        "problem": "shaken.yaml",
-        "bias": error,
-        "virtual": {"rate": "300 Hz", "noise": error, "bias": error},
-    }
-    return _track_case(folder, track, TRUTH | begin, ["shear_stiffness", "damping_ratio"])
+    wanted = ["shear_stiffness", "damping_ratio"]
+    return _track_case(folder, "shaken.yaml", "300 Hz", error, TRUTH | begin, wanted)
 
 
 def _track_case(
-    folder: Path, given: dict[str, Any], begin_of: dict[str, Any], wanted: list[str]
-) -> Case:
-    shutil.copy(SPECIMENS / given["problem"], folder)
-    track = {"kind": "track", "name": "motion", "structure": "altered", **given}
+    folder: Path, problem: str, rate: str, error: dict[str, str], begin_of: dict[str, Any],
+    wanted: list[str],
+) -> Case:  # fmt: skip
+    shutil.copy(SPECIMENS / problem, folder)
+    track: dict[str, Any] = {"kind": "track", "name": "motion", "structure": "altered"}
+    track |= {
+        "problem": problem,
+        "bias": error,
+        "virtual": {"rate": rate, "noise": error, "bias": error},
+    }
     asked = loaded(folder, described([track], wanted, material=begin_of))
     begin, true, each = start_constants(asked), computed_sets.true_constants(asked), asked.data[0]
     assert isinstance(each, TrackedMotion)
@@ -149,13 +135,7 @@ def _track_case(
 
 
 class Trials(NamedTuple):
-    """What came out.
-
-    Attributes:
-        names: of the constants.
-        inside: (n_names,) of how many intervals the truth is inside.
-        width: (n_names,) mean half width of the intervals' logarithms over that of the bound.
-    """
+    """By constant: how many intervals hold the truth, and their half width over the bound's."""
 
     names: tuple[str, ...]
     inside: list[int]
@@ -167,11 +147,7 @@ def tried(case: Case) -> Trials:
     true = case.true.logs(names)
     inside, width = [], []
     for seed in range(SEEDS):
-        model = FitModel(
-            start_constants(case.asked), names, case.draw(np.random.default_rng([7, seed]))
-        )
-        found = fit_settled(model)
-        estimate = estimates.estimate_constants(found, fit_uncertainty.estimate_errors(found))
+        estimate = _estimated(case, np.random.default_rng([7, seed]))
         low, high = (np.log(ends[: len(names)]) for ends in (estimate.low, estimate.high))
         inside.append((low < true) & (true < high))
         width.append((high - low) / 2)
@@ -179,6 +155,12 @@ def tried(case: Case) -> Trials:
     told = Trials(names, np.sum(inside, axis=0).tolist(), np.mean(width, axis=0) / (NORMAL * bound))
     print(told)  # noqa: T201
     return told
+
+
+def _estimated(case: Case, random: np.random.Generator) -> estimates.Estimate:
+    model = FitModel(start_constants(case.asked), case.asked.fit, case.draw(random))
+    found = fit_settled(model)
+    return estimates.estimate_constants(found, fit_uncertainty.estimate_errors(found))
 
 
 def _bound(case: Case) -> Floats:
@@ -205,11 +187,7 @@ def test_a_track_of_little_noise_tells_constants_within_1_percent(
     case: Callable[[Path, float], Case], tmp_path: Path
 ) -> None:
     made = case(tmp_path, 0.1)
-    model = FitModel(
-        start_constants(made.asked), made.asked.fit, made.draw(np.random.default_rng(0))
-    )
-    found = fit_settled(model)
-    estimate = estimates.estimate_constants(found, fit_uncertainty.estimate_errors(found))
+    estimate = _estimated(made, np.random.default_rng(0))
     middle = np.sqrt(estimate.low * estimate.high)[: len(made.asked.fit)]
     true = np.exp(made.true.logs(made.asked.fit))
     np.testing.assert_allclose(middle, true, rtol=0.01)

@@ -18,17 +18,17 @@ from tests.e2e.checkout import Checkout
 
 CLIP = ROOT / "tests/data/tracking/b_harmonic.yaml"
 STUDY = "filmed"
-AS_FILMED = {
-    "lattice": {"ligament_length": "2.3 mm", "bias_angle": "-20 deg"},
-    "drive": {"directions": ["45 deg"], "weights": [1.0]},
-    "horizon": {"periods": 0.5, "samples": 10},
-    "cloak": {"disc": {"radius": "16 mm"}},
-    "optimiser": {"methods": {"sqp": {"evaluations": 1}, "mma": None}},
-    "solver": {"accuracy": "draft"},
-    "response": {"cycles": 0.5, "samples": 26},
-    "prediction": {"samples": 4},
-    "report": {"measured_constants": None, "as_built": False},
-}
+AS_FILMED = yaml.safe_load("""
+lattice: { ligament_length: 2.3 mm, bias_angle: -20 deg }
+drive: { directions: [45 deg], weights: [1.0] }
+horizon: { periods: 0.5, samples: 10 }
+cloak: { disc: { radius: 16 mm } }
+optimiser: { methods: { sqp: { evaluations: 1 }, mma: null } }
+solver: { accuracy: draft }
+response: { cycles: 0.5, samples: 26 }
+prediction: { samples: 4 }
+report: { measured_constants: null, as_built: false }
+""")
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """What a drive that is known by measurement alone costs: by the adjoint as by differences."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,10 +28,8 @@ def fit(tmp_path_factory: pytest.TempPathFactory) -> Fit:
     folder = tmp_path_factory.mktemp("shaken")
     slower = SPECIMEN.read_text().replace("width: 25 ms", "width: 60 ms")
     (folder / SPECIMEN.name).write_text(slower)
-    track = {
-        "kind": "track",
-        "name": "motion",
-        "structure": "altered",
+    track: dict[str, Any] = {"kind": "track", "name": "motion", "structure": "altered"}
+    track |= {
         "problem": SPECIMEN.name,
         "bias": ERROR,
         "virtual": {"rate": "120 Hz", "noise": ERROR, "bias": ERROR},

@@ -5,45 +5,32 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.runtime import ROOT
-from tests.pipeline.calibration.specimens import described, written
+from tests.pipeline.calibration.specimens import TRUTH, described, written
 
 SPECIMEN = ROOT / "experiments/calibration/specimens/squeezed.yaml"
-NOISE = {"displacement": "0.002 mm", "rotation": "0.01 deg"}
+TRACK = """
+{ kind: track, name: motion, problem: squeezed.yaml, structure: altered, every: 2,
+  virtual: { rate: 8 Hz, noise: { displacement: 0.002 mm, rotation: 0.01 deg },
+             bias: { displacement: 0.05 mm, rotation: 0.2 deg } } }
+"""
 
 
 def test_ratios_of_stiffness_from_motion_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shutil.copy(SPECIMEN, tmp_path / "squeezed.yaml")
-    track = {
-        "kind": "track",
-        "name": "motion",
-        "problem": "squeezed.yaml",
-        "structure": "altered",
-        "every": 2,
-        "virtual": {
-            "rate": "8 Hz",
-            "noise": NOISE,
-            "bias": {"displacement": "0.05 mm", "rotation": "0.2 deg"},
-        },
-    }
-    start = {
-        "density": "6.18 kg/m^2",
-        "axial_stiffness": "120 N/mm",
-        "shear_stiffness": "1.19 N/mm",
-        "bending_stiffness": "1.8 N mm/rad",
-        "damping": {"ratio": 0.0186},
-    }
+    track = yaml.safe_load(TRACK)
+    start = TRUTH | {"bending_stiffness": "1.8 N mm/rad"}
     text = described([track], ["bending_stiffness", "damping_ratio"], material=start)
     path = written(tmp_path, text)
     folder, out = tmp_path / "data", tmp_path / "found.nc"
-    assert (
-        run_stage("calibrate", ["synthesise", str(path), "--out-dir", str(folder), "--quiet"]) == 0
-    )
+    words = ["synthesise", str(path), "--out-dir", str(folder), "--quiet"]
+    assert run_stage("calibrate", words) == 0
     assert datasets.read(folder / "motion.nc", "track").attrs["synthetic"] == "yes"
     assert run_stage("calibrate", [str(folder / "calibration.yaml"), "--out", str(out)]) == 0
     found = datasets.read(out, "calibration")

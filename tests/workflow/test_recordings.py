@@ -21,10 +21,7 @@ def test_virtual_recordings_are_rendered_and_tracked(sandbox: Sandbox) -> None:
     assert planned["film_render"] == planned["track"] == planned["track_report"] == count > 0
     assert planned["virtual_specimen"] == count
     assert not {"simulate", "film_weigh"} & planned.keys()
-
-
-def test_a_virtual_load_cell_is_read_with_its_video(sandbox: Sandbox) -> None:
-    planned = sandbox.planned("fig4_recordings")
+    planned = sandbox.planned("fig4_recordings")  # with a virtual load cell
     assert planned["film_weigh"] == planned["virtual_specimen"] == planned["track"] == 2
 
 

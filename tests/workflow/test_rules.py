@@ -13,33 +13,21 @@ from pipeline.runtime import ROOT
 from pipeline.workflow.rule_inputs import check_room
 from tests.workflow.conftest import Sandbox
 
-STUDY = {
-    "design": 2,
-    "select": 1,
-    "simulate": 1,
-    "as_built": 1,
-    "sweep": 4,
-    "sweep_gather": 1,
-    "sweep_constants": 1,
-    "virtual_specimen": 2,
-    "film_render": 2,
-    "track": 2,
-    "compare": 2,
-    "report": 1,
-    "fig2": 1,
-}
+STUDY = {"design": 2, "select": 1, "simulate": 1, "as_built": 1, "sweep": 4, "sweep_gather": 1}
+STUDY |= {"sweep_constants": 1, "virtual_specimen": 2, "film_render": 2, "track": 2, "compare": 2}
+STUDY |= {"report": 1, "fig2": 1}
 
 
 def only(*rules: str) -> dict[str, int]:
     return {rule: STUDY[rule] for rule in (*rules, "fig2")}
 
 
-def test_study_from_nothing(sandbox: Sandbox) -> None:
+def test_studies_from_nothing(sandbox: Sandbox) -> None:
     assert sandbox.planned("fig2") == STUDY
-
-
-def test_map_has_no_part_without_a_frequency(sandbox: Sandbox) -> None:
-    assert sandbox.planned("fig2@quick")["sweep"] == 3
+    assert sandbox.planned("fig2@quick")["sweep"] == 3  # its map has no part without a frequency
+    packages = {"fabricate": 2, "fabrication_page": 1, "fig2_fabrication": 1}
+    assert sandbox.planned("fig2_fabrication") == {"design": 2, "select": 1, **packages}
+    assert sandbox.planned("benchmark") == {"measure": 12, "benchmark": 1}
 
 
 def test_a_figure_of_several_studies(sandbox: Sandbox) -> None:
@@ -68,10 +56,6 @@ def test_every_figure_of_the_paper_and_its_index(sandbox: Sandbox) -> None:
     assert sandbox.planned("index") == {"index": 1}
 
 
-def test_a_job_for_each_benchmark_and_its_page(sandbox: Sandbox) -> None:
-    assert sandbox.planned("benchmark") == {"measure": 12, "benchmark": 1}
-
-
 def test_a_job_for_each_of_several_designs(sandbox: Sandbox) -> None:
     planned = sandbox.planned("fig3@quick")
     assert planned["design"] == planned["simulate"] == 2
@@ -83,23 +67,12 @@ def test_a_job_for_each_of_several_designs(sandbox: Sandbox) -> None:
 
 def test_datasets_are_those_that_the_problem_asks_for(sandbox: Sandbox) -> None:
     before, _, rest = sandbox.problem.read_text().partition("\nsweep:\n")
-    sandbox.problem.write_text(
-        before + "\nrobustness:\n  samples: 5\n\n" + rest[rest.index("report:") :]
-    )
+    rest = rest[rest.index("report:") :]
+    sandbox.problem.write_text(f"{before}\nrobustness:\n  samples: 5\n\n{rest}")
     planned = sandbox.planned("fig2")
     assert planned["monte_carlo"] == 2
     assert planned["monte_carlo_gather"] == 1
     assert not {"sweep", "sweep_gather"} & planned.keys()
-
-
-def test_packages_need_the_design_and_nothing_else(sandbox: Sandbox) -> None:
-    assert sandbox.planned("fig2_fabrication") == {
-        "design": 2,
-        "select": 1,
-        "fabricate": 2,
-        "fabrication_page": 1,
-        "fig2_fabrication": 1,
-    }
 
 
 def test_preset_has_its_own_targets_and_folder(sandbox: Sandbox) -> None:
@@ -121,24 +94,18 @@ def test_planning_imports_nothing_heavy() -> None:
         "import sys; from pipeline.workflow import rule_inputs;"
         "rule_inputs.check_problems(['fig2']); print(*sys.modules)"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, text=True, capture_output=True, check=True
-    )
-    assert not {"jax", "matplotlib", "numba", "xarray"} & set(ended.stdout.split())
+    told = subprocess.check_output([sys.executable, "-c", script], cwd=ROOT, text=True)
+    assert not {"jax", "matplotlib", "numba", "xarray"} & set(told.split())
+
+
+SHOWN = ("simulate", "as_built", "virtual_specimen", "film_render", "track", "compare", "report")
 
 
 @pytest.mark.parametrize(
     ("old", "new", "rerun"),
     [
         ("points: 15", "points: 14", only("sweep", "sweep_gather", "report")),
-        (
-            "cycles: 4",
-            "cycles: 3",
-            only(
-                *("simulate", "as_built", "virtual_specimen", "film_render", "track", "compare"),
-                "report",
-            ),
-        ),
+        ("cycles: 4", "cycles: 3", only(*SHOWN)),
         ("title: Shielding", "title: Hiding", only("report")),
         ("evaluations: 60", "evaluations: 61", STUDY | {"design": 1}),
         ("amplitude: 4.5 mm", "amplitude: 4.4 mm", STUDY),
@@ -183,9 +150,6 @@ def test_names_that_targets_cannot_have_are_refused(sandbox: Sandbox, name: str)
     assert f"sound/recordings/{name}.yaml" in ended.stderr
     assert "remedy: name it " in ended.stderr
     assert not list(sandbox.root.rglob("pwned"))
-
-
-def test_unknown_preset_is_one_message(sandbox: Sandbox) -> None:
     ended = sandbox.run("fig2@edge4")
     assert ended.returncode != 0
     assert "did you mean 'edge3'?" in ended.stderr

@@ -7,36 +7,9 @@ import pytest
 from pipeline.runtime import source_closure
 from pipeline.runtime.locations import ROOT
 from pipeline.runtime.source_closure import source_files, source_hash
+from tests.tables import cases, tables
 
-FILES = {
-    "sim/__init__.py": "",
-    "sim/energy.py": "import numpy as np\n",
-    "sim/inner/__init__.py": "from .deep import value\n",
-    "sim/inner/deep.py": "value = 1\n",
-    "sim/unused.py": "",
-    "pipeline/__init__.py": "",
-    "pipeline/cli.py": "from pipeline import errors\n",
-    "pipeline/errors.py": "",
-    "pipeline/rules/a.smk": "",
-    "pipeline/late.py": "def f():\n    from sim import energy\n    import sim.inner\n",
-    "pipeline/stage.py": "from . import late\nfrom .cli import main\nfrom sim.energy import law\n",
-    "pipeline/loop_a.py": "import pipeline.loop_b\n",
-    "pipeline/loop_b.py": "import pipeline.loop_a\n",
-    "sim/lazy/__init__.py": "",
-    "sim/lazy/__init__.pyi": "from .wanted import law as law\nfrom .other import less as less\n",
-    "sim/lazy/wanted.py": "",
-    "sim/lazy/other.py": "",
-    "pipeline/through_a_face.py": "from sim.lazy import law\n",
-    "reports/__init__.py": "",
-    "reports/build.py": "import pipeline.errors\n",
-    "reports/build.yaml": "prose of the module",
-    "reports/unused.py": "",
-    "reports/unused.yaml": "prose of another module",
-    "reports/templates/page.html": "<html>",
-    "reports/style.mplstyle": "",
-    "reports/other/__init__.py": "",
-    "reports/other/unused.css": "",
-}
+FILES: dict[str, str] = tables("workflow")["sources"]
 
 
 @pytest.fixture
@@ -52,48 +25,11 @@ def closure(module: str, root: Path) -> set[str]:
     return {path.relative_to(root).as_posix() for path in source_files(module, root)}
 
 
-def test_closure_follows_every_form_of_import(tree: Path) -> None:
-    assert closure("pipeline.stage", tree) == {
-        "pipeline/__init__.py",
-        "pipeline/cli.py",
-        "pipeline/errors.py",
-        "pipeline/late.py",
-        "pipeline/stage.py",
-        "sim/__init__.py",
-        "sim/energy.py",
-        "sim/inner/__init__.py",
-        "sim/inner/deep.py",
-    }
-
-
-def test_closure_follows_one_name_through_a_lazy_package(tree: Path) -> None:
-    assert closure("pipeline.through_a_face", tree) == {
-        "pipeline/__init__.py",
-        "pipeline/through_a_face.py",
-        "sim/__init__.py",
-        "sim/lazy/__init__.py",
-        "sim/lazy/wanted.py",
-    }
-
-
-def test_closure_ends_in_circular_imports(tree: Path) -> None:
-    assert closure("pipeline.loop_a", tree) == {
-        "pipeline/__init__.py",
-        "pipeline/loop_a.py",
-        "pipeline/loop_b.py",
-    }
-
-
-def test_closure_holds_the_resources_of_its_packages_only(tree: Path) -> None:
-    assert closure("reports.build", tree) == {
-        "pipeline/__init__.py",
-        "pipeline/errors.py",
-        "reports/__init__.py",
-        "reports/build.py",
-        "reports/build.yaml",
-        "reports/style.mplstyle",
-        "reports/templates/page.html",
-    }
+@cases("workflow", "module, files")
+def test_a_closure_holds_what_is_imported_in_any_form_and_resources(
+    tree: Path, module: str, files: list[str]
+) -> None:
+    assert closure(module, tree) == set(files)
 
 
 def test_unknown_module_is_refused(tree: Path) -> None:

@@ -40,9 +40,6 @@ def test_jobs_of_this_folder_and_of_a_run_are_cancelled(queue: Path) -> None:
 
 
 def test_a_cluster_that_does_not_answer_is_told(queue: Path) -> None:
+    assert stale_jobs.cancel(queue.parent) == []  # no run used a cluster: none is asked
     with pytest.raises(UserError, match="SLURM does not answer"):
         stale_jobs.cancel(used(queue.parent))  # there is no queue to list
-
-
-def test_a_folder_that_no_run_used_a_cluster_for_asks_none(queue: Path) -> None:
-    assert stale_jobs.cancel(queue.parent) == []  # there is no queue to list

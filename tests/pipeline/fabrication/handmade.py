@@ -88,5 +88,5 @@ def _unit(
     letters = (np.add(centre, [[-1.0, -1.5], [-1.0, 1.5], [0.5, 1.5]]),)
     arrow = (np.add(centre, [[1.5, -1.0], [1.5, 1.0]]),)
     dots = (Circle((float(centre[0]), float(centre[1])), 2.0),)
-    marks = letters, arrow, dots
-    return Unit(number, label, *index, design, outline, tuple(slots), *marks, ASKED.thickness)
+    drawn = design, outline, tuple(slots)
+    return Unit(number, label, *index, *drawn, letters, arrow, dots, ASKED.thickness)

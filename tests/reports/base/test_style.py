@@ -7,6 +7,7 @@ from matplotlib.colors import Colormap, to_rgb
 from matplotlib.font_manager import FontProperties, findfont
 
 from reports.base import style
+from tests.tables import tables
 
 
 def lab(colours: Colormap) -> np.ndarray:
@@ -23,11 +24,8 @@ def test_neighbouring_levels_look_equally_different(levels: np.ndarray) -> None:
     assert steps.std() < 0.01 * steps.mean()
 
 
-def test_magnitude_reads_in_grey() -> None:
+def test_magnitude_reads_in_grey_and_signed_is_palest_at_zero_and_balanced() -> None:
     assert (np.diff(lab(style.MAGNITUDE)[:, 0]) < 0).all()
-
-
-def test_signed_is_palest_at_zero_and_balanced() -> None:
     lightness = lab(style.SIGNED)[:, 0]
     assert lightness.argmax() in {127, 128}
     assert (np.diff(lightness)[:127] > 0).all()
@@ -36,40 +34,22 @@ def test_signed_is_palest_at_zero_and_balanced() -> None:
 
 
 VISION = {  # of linear RGB: Machado, Oliveira and Fernandes 2009, at full severity
-    "protanopia": [
-        [0.152286, 1.052583, -0.204868],
-        [0.114503, 0.786281, 0.099216],
-        [-0.003882, -0.048116, 1.051998],
-    ],
-    "deuteranopia": [
-        [0.367322, 0.860646, -0.227968],
-        [0.280085, 0.672501, 0.047413],
-        [-0.011820, 0.042940, 0.968881],
-    ],
-    "tritanopia": [
-        [1.255528, -0.076749, -0.178779],
-        [-0.078411, 0.930809, 0.147602],
-        [0.004733, 0.691367, 0.303900],
-    ],
+    name: np.array(rows) for name, rows in tables("reports")["colour_vision"].items()
 }
 
 
 def seen(rgb: np.ndarray, kind: str) -> np.ndarray:
     """OKLab of sRGB colours as somebody without one kind of cones sees them."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    linear = np.clip(linear @ np.array(VISION[kind]).T, 0.0, 1.0)
-    return style.oklab(
-        np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    )
+    linear = np.clip(linear @ VISION[kind].T, 0.0, 1.0)
+    powered = 1.055 * linear ** (1 / 2.4) - 0.055
+    return style.oklab(np.where(linear <= 0.0031308, 12.92 * linear, powered))
 
 
 @pytest.mark.parametrize("kind", VISION)
 def test_maps_and_structures_can_be_told_apart_with_any_colour_vision(kind: str) -> None:
-    levels = np.arange(256)
-    magnitude, signed = (
-        seen(np.asarray(colours(levels))[:, :3], kind)
-        for colours in (style.MAGNITUDE, style.SIGNED)
-    )
+    maps, levels = (style.MAGNITUDE, style.SIGNED), np.arange(256)
+    magnitude, signed = (seen(np.asarray(each(levels))[:, :3], kind) for each in maps)
     assert (np.diff(magnitude[:, 0]) < 0).all()
     assert np.linalg.norm(signed[40] - signed[215]) > 0.1
     colours = np.array([to_rgb(c) for c in (style.INTACT, style.ALTERED, style.CLOAKED)])
@@ -98,10 +78,8 @@ def test_style_ignores_the_settings_of_the_user() -> None:
 def test_axes_have_the_size_that_they_will_have_in_print() -> None:
     figure = style.page(100.0)
     axes = style.place(figure, 10.0, 20.0, 50.0, 30.0)
-    left, bottom, width, height = axes.get_position().bounds
-    np.testing.assert_allclose(
-        [left * 178, bottom * 100, width * 178, height * 100], [10, 50, 50, 30]
-    )
+    bounds = np.array(axes.get_position().bounds) * [178, 100, 178, 100]
+    np.testing.assert_allclose(bounds, [10, 50, 50, 30])
 
 
 def test_saved_files_have_the_same_bytes(tmp_path: Path) -> None:

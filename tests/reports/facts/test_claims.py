@@ -9,6 +9,7 @@ from reports.facts import Fact, claims, number
 from reports.figures.loading_path import facts as along
 from reports.figures.shielding import facts as shielding
 from reports.study import StudyResults
+from tests.tables import cases
 
 UNIT = {"1", "mm", "ms", "deg", "%", "Hz", "spacings"}
 
@@ -37,38 +38,12 @@ def test_every_claim_on_a_study_that_can_be_built_has_its_fact(
         assert judged.simulation.status in {"holds", "does not hold"}, judged.claim.fact
 
 
-@pytest.mark.parametrize(
-    ("text", "number"),
-    [
-        ("5.2 mm", (5.2, "mm", 0.1)),
-        ("64 %", (64.0, "%", 1.0)),
-        ("15 x 15", (225.0, "1", 1.0)),
-        ("0.35", (0.35, "1", 0.01)),
-    ],
-)
-def test_numbers_are_read_with_their_last_place(
-    text: str, number: tuple[float, str, float]
-) -> None:
-    assert claims.parsed(text) == pytest.approx(number)
+@cases("reports", "text, number")
+def test_numbers_are_read_with_their_last_place(text: str, number: list[object]) -> None:
+    assert list(claims.parsed(text)) == pytest.approx(number)
 
 
-@pytest.mark.parametrize(
-    ("ours", "relation", "holds"),
-    [
-        (5.24, "is", True),
-        (5.26, "is", False),
-        (5.7, "about", True),
-        (5.73, "about", False),
-        (5.16, "at least", True),
-        (5.1, "at least", False),
-        (5.24, "at most", True),
-        (5.3, "at most", False),
-        (5.2, "above", False),
-        (5.3, "above", True),
-        (5.2, "below", False),
-        (5.1, "below", True),
-    ],
-)
+@cases("reports", "ours, relation, holds")
 def test_a_relation_has_its_tolerance(ours: float, relation: claims.Relation, holds: bool) -> None:
     assert claims.agrees(ours, relation, 5.2, 0.1) is holds
 
@@ -80,20 +55,17 @@ def found(*facts: Fact) -> dict[str, claims.JudgedClaim]:
 ROTATION = number("rotation_altered", "mean", 10.5, "deg")
 
 
-def test_both_holds_only_where_both_hold() -> None:
+def test_both_holds_only_where_both_hold_and_what_is_missing_is_told() -> None:
+    assert found()["rotation_altered"].simulation.why == "study not built"
+    assert found(ROTATION)["rotation_reduction"].simulation.why == "no result"
     alone = found(ROTATION)["rotation_altered"]
+    assert alone.experiment.why == "no recording compared"
     assert (alone.simulation.status, alone.experiment.status) == ("holds", "not yet evaluated")
     assert alone.both == "not yet evaluated"
     measured = replace(ROTATION, key="measured_rotation_altered", value=11.5)
     assert found(ROTATION, measured)["rotation_altered"].both == "holds"
     off = replace(measured, value=15.0)
     assert found(ROTATION, off)["rotation_altered"].both == "does not hold"
-
-
-def test_what_is_missing_is_told() -> None:
-    assert found()["rotation_altered"].simulation.why == "study not built"
-    assert found(ROTATION)["rotation_reduction"].simulation.why == "no result"
-    assert found(ROTATION)["rotation_altered"].experiment.why == "no recording compared"
 
 
 def test_multiples_of_the_spacing_are_lengths() -> None:

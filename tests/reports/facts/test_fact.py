@@ -10,6 +10,7 @@ from reports.figures.shielding import monitored
 from reports.figures.shielding.facts import shielding_facts
 from reports.study import StudyResults
 from tests.reports import shaken_study
+from tests.tables import cases
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +18,12 @@ def found(study: StudyResults) -> dict[str, Fact]:
     return {fact.key: fact for fact in shielding_facts(study)}
 
 
-def test_every_number_that_the_paper_quotes_is_there(found: dict[str, Fact]) -> None:
+def test_every_number_that_the_paper_quotes_is_there_once_and_in_a_group(
+    study: StudyResults, found: dict[str, Fact]
+) -> None:
+    everything = shielding_facts(study)
+    assert len(everything) == len(found)
+    assert all(fact.group for fact in everything)
     quoted = {fact.paper for fact in found.values() if fact.paper != fact_records.ABSENT}
     assert {
         "15 × 15", "15 mm", "20°", "4.5 mm", "2 Hz", "0, 45, 90, 135°", "60 mm = 4 spacings",
@@ -25,38 +31,7 @@ def test_every_number_that_the_paper_quotes_is_there(found: dict[str, Fact]) -> 
     } <= quoted  # fmt: skip
 
 
-def test_keys_are_unique_and_everything_has_a_group(study: StudyResults) -> None:
-    everything = shielding_facts(study)
-    assert len({fact.key for fact in everything}) == len(everything)
-    assert all(fact.group for fact in everything)
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "words"),
-    [
-        ("bias", 20.0, "20°"),
-        ("radius", 67.5, "67.5 mm = 4.5 spacings"),
-        ("horizon", 1.0, "1 s"),
-        ("mean_reduction", 88.0, "88.0 %"),
-        ("mean_reduction_all", 88.0, "88.0 %"),
-        ("peak_to_peak_reduction", 88.0, "88.0 %"),
-        ("evaluations_sqp", 160, "160"),
-        ("evaluations_mma", 60, "60"),
-        ("kkt_sqp", 2e-4, "0.0002"),
-        ("map_max", 0.05 + 0.06 * 1.25, "0.1250"),
-        ("map_min", 0.05, "0.0500"),
-        ("map_reduction", 100 * (1 - np.sqrt(1 / 20)), "77.6 %"),
-        ("map_failed", 0, "0"),
-        ("margin_edge_length", 0.0, "0 mm"),
-        ("margin_void_angle", 0.0, "0°"),
-        ("margin_block_angle", np.degrees(0.01), "0.573°"),
-        ("gap", 0.11, "0.11 mm"),
-        ("gap_motion", 0.08, "0.08 mm"),
-        ("overlaps_motion", 0, "0"),
-        ("loss_error", 3e-5, "3 × 10⁻⁵"),
-        ("void_angle_motion", 0.0, "0°"),
-    ],
-)
+@cases("reports", "key, value, words")
 def test_values(found: dict[str, Fact], key: str, value: float, words: str) -> None:
     assert found[key].value == pytest.approx(value, rel=1e-9, abs=1e-9)
     assert found[key].ours == words
@@ -81,9 +56,6 @@ def test_peak_to_peak_is_that_of_the_middle_unit_at_45_degrees(
     assert found["peak_to_peak_altered"].value == pytest.approx(float(np.ptp(uy[0])))
     assert found["peak_to_peak_cloaked"].value == pytest.approx(float(np.ptp(uy[1])))
     assert found["peak_to_peak_altered_horizon"].value == pytest.approx(float(np.ptp(uy[0, :201])))
-
-
-def test_cycles_are_named(found: dict[str, Fact]) -> None:
     assert "cycles 1 to 4" in found["peak_to_peak_altered"].label
     assert "cycles 1 to 2" in found["peak_to_peak_altered_horizon"].label
 

@@ -45,42 +45,28 @@ def _with_second_case(response: xr.Dataset) -> xr.Dataset:
     return whole.assign_attrs(response.attrs)
 
 
-def test_each_load_case_has_its_name(two: StudyResults) -> None:
-    assert abscissa.load_names(two.problem, two.response) == ("compression 180°", "shear 90°")
-
-
 def test_each_load_case_has_its_rows(two: StudyResults) -> None:
+    assert abscissa.load_names(two.problem, two.response) == ("compression 180°", "shear 90°")
     path = abscissa.abscissa_of(two.problem, two.response)
     found: dict[str, Fact] = {fact.key: fact for fact in facts.measure_facts(two, path)}
     one, other = (found[f"rotation_altered_case{case}"].value for case in (0, 1))
     assert other == pytest.approx(3 * one)
     assert found["rotation_altered"].value == pytest.approx(2 * one)
     assert "shear 90°" in found["rotation_altered_case1"].label
-
-
-def test_the_table_of_the_path_has_each_load_case(two: StudyResults) -> None:
     columns = tables.path(two)
-    first, second = (
-        columns[f"altered_rotation_deg_{name}_{angle}deg"]
-        for name, angle in (("compression", 180), ("shear", 90))
-    )
-    np.testing.assert_allclose(second, 3 * np.asarray(first))
+    names = ("altered_rotation_deg_compression_180deg", "altered_rotation_deg_shear_90deg")
+    first, second = (np.asarray(columns[name]) for name in names)
+    np.testing.assert_allclose(second, 3 * first)
 
 
 def test_each_load_case_has_snapshots_and_a_curve_of_its_own(two: StudyResults) -> None:
     shown = snapshot_grid.rows(two)
     assert [row.case for row in shown][:4] == [0, 1, 0, 1]
     assert len({row.label for row in shown[:4]}) == 4
-    made = Figure()
-    curves.measure_panel(
-        made.add_subplot(),
-        two,
-        abscissa.abscissa_of(two.problem, two.response),
-        measures.measure_of(two.problem),
-    )
+    made, path = Figure(), abscissa.abscissa_of(two.problem, two.response)
+    curves.measure_panel(made.add_subplot(), two, path, measures.measure_of(two.problem))
     drawn = {line.get_label(): line for line in made.axes[0].get_lines()}
     one, other = (drawn[f"Cloaked, {name}"] for name in ("compression 180°", "shear 90°"))
     assert (one.get_color(), one.get_linestyle()) != (other.get_color(), other.get_linestyle())
-    rises = (np.asarray(line.get_ydata(), dtype=float) for line in (one, other))
-    once, thrice = rises
+    once, thrice = (np.asarray(line.get_ydata(), dtype=float) for line in (one, other))
     np.testing.assert_allclose(thrice, 3 * once)

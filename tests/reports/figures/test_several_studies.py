@@ -14,6 +14,7 @@ from reports.figures.several_studies.several_studies_report import load, several
 from reports.page import publish
 from reports.study import StudyResults
 from tests.reports import compressed_study, figure_assertions
+from tests.tables import cases
 
 ASKED = JointFigure(title="Two voids", studies=("fig_smile", "fig_frown"))
 
@@ -69,9 +70,8 @@ def test_command_line(tmp_path: Path) -> None:
     asked.write_text("title: Two voids\nstudies: [fig_smile, fig_frown]\n")
     words = ["--figure", str(asked), "--results", str(experiments)]
     assert main(["several-studies", *words, "--out-dir", str(tmp_path / "report")]) == 0
-    assert {"fig.pdf", "fig.svg", "fig.png", "index.html", "fig_frown_robustness.csv"} <= {
-        path.name for path in (tmp_path / "report").iterdir()
-    }
+    names = {path.name for path in (tmp_path / "report").iterdir()}
+    assert {"fig.pdf", "fig.svg", "fig.png", "index.html", "fig_frown_robustness.csv"} <= names
 
 
 def test_the_committed_figure_names_studies() -> None:
@@ -79,14 +79,7 @@ def test_the_committed_figure_names_studies() -> None:
     assert joint_figure.load_joint_figure(path).studies == ("fig6_heart", "fig6_shamrock")
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("studies: [nowhere]", "no study 'nowhere'"),
-        ("studies: []", "at least 1 item"),
-        ("study: [fig2]", "unknown key"),
-    ],
-)
+@cases("reports", "text, told")
 def test_a_faulty_figure_is_told(tmp_path: Path, text: str, told: str) -> None:
     (tmp_path / "figure.yaml").write_text(text)
     with pytest.raises(UserError, match=told):

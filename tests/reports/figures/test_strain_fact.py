@@ -8,20 +8,13 @@ import pytest
 from pipeline import problem
 from reports.figures.loading_path.abscissa import Abscissa
 from reports.figures.loading_path.facts import strain_facts
+from tests.tables import cases
 
 FIG4 = Path(__file__).parents[3] / "experiments/fig4/problem.yaml"
 PATH = Abscissa("displacement", "u", "mm", np.array([0.0, 15.0]), True, None, (0, 1))
 
 
-@pytest.mark.parametrize(
-    ("degrees", "labels"),
-    [
-        ((180,), ["Compression"]),
-        ((0,), ["Extension"]),
-        ((90,), ["Shear"]),
-        ((180, 270), ["Compression", "Shear"]),
-    ],
-)
+@cases("reports", "degrees, labels")
 def test_a_drive_of_the_right_column_is_named(
     degrees: tuple[float, ...], labels: list[str]
 ) -> None:

@@ -59,13 +59,8 @@ def test_links_lead_somewhere(html: str, report: Path) -> None:
 
 def test_inlined_tables_are_the_files_beside_the_page(html: str, report: Path) -> None:
     tables = {name: href for name, href in Links(html).hrefs.items() if href.startswith("data:")}
-    assert sorted(tables) == [
-        "design.csv",
-        "facts.csv",
-        "loss_history.csv",
-        "robustness.csv",
-        "top_edge.csv",
-    ]
+    names = ("design", "facts", "loss_history", "robustness", "top_edge")
+    assert sorted(tables) == [f"{name}.csv" for name in names]
     for name, href in tables.items():
         assert base64.b64decode(href.partition(",")[2]) == (report / name).read_bytes()
 
@@ -79,11 +74,8 @@ def test_tables_hold_what_the_panels_show(report: Path, study: StudyResults) -> 
 
     uy = study.response["displacement"].values[1, 1, :, 7 + 15 * 14, 1]
     np.testing.assert_allclose(column("top_edge.csv", "cloaked_45deg_uy_mm"), uy, rtol=1e-9)
-    np.testing.assert_allclose(
-        column("robustness.csv", "J_cloaked"),
-        frequency_map(study.sweep)["loss"].values.ravel(),
-        rtol=1e-9,
-    )
+    losses = frequency_map(study.sweep)["loss"].values.ravel()
+    np.testing.assert_allclose(column("robustness.csv", "J_cloaked"), losses, rtol=1e-9)
     assert len(column("loss_history.csv", "J")) == 220  # 160 by SQP, 60 by MMA
     assert len(column("design.csv", "x_mm")) == 900
 
@@ -99,33 +91,30 @@ def test_page_tells_where_it_is_from(html: str, study: StudyResults) -> None:
     assert "&#34;spacing&#34;: 15.0" in html
 
 
-def test_page_shows_paper_and_ours(html: str) -> None:
+def test_page_shows_paper_and_ours_but_where_there_is_no_paper(
+    html: str, quick: StudyResults, quick_report: Path
+) -> None:
     for words in ("≈ 70 %", "88.0 %", "5.2 mm", "63 %", "&lt; 0.35"):
         assert words in html
     assert '<th scope="col">Paper</th>' in html
     assert "DRAFT" not in html
-
-
-def test_without_a_paper_there_is_no_column_for_it(quick: StudyResults) -> None:
+    draft = (quick_report / "index.html").read_text(encoding="utf-8")
+    assert "DRAFT" in draft
+    assert "49 units instead of 225" in draft
     settings = quick.problem.report.model_copy(update={"paper": None})
-    problem = quick.problem.model_copy(update={"report": settings})
-    html = rendered(study_report(dataclasses.replace(quick, problem=problem)), {})
-    assert "Paper</th>" not in html
-    assert "<span>paper" not in html
+    alone = page_of(quick, report=settings)
+    assert "Paper</th>" not in alone
+    assert "<span>paper" not in alone
 
 
-def test_a_draft_says_so(quick_report: Path) -> None:
-    html = (quick_report / "index.html").read_text(encoding="utf-8")
-    assert "DRAFT" in html
-    assert "49 units instead of 225" in html
+def page_of(study: StudyResults, **changes: object) -> str:
+    """The page of a study whose problem is changed."""
+    problem = study.problem.model_copy(update=changes)
+    return rendered(study_report(dataclasses.replace(study, problem=problem)), {})
 
 
 def test_words_of_a_problem_are_escaped(quick: StudyResults) -> None:
-    hostile = dataclasses.replace(
-        quick,
-        problem=quick.problem.model_copy(update={"title": "</script><b>&", "doc": "</script><b>"}),
-    )
-    html = rendered(study_report(hostile), {})
+    html = page_of(quick, title="</script><b>&", doc="</script><b>")
     assert "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>" in html
     assert html.count("</script>") == 2
     data = re.search(r'id="player-data">(.*?)</script>', html, re.DOTALL)

@@ -80,18 +80,12 @@ def test_lost_units_are_marked_as_such() -> None:
     assert (np.delete(levels.reshape(12, 3), 6, axis=0) == animation_data.LARGEST_LEVEL).all()
 
 
-def test_no_motion_is_exact() -> None:
+def test_a_static_study_needs_no_time_and_no_motion_is_exact() -> None:
     data = static(np.zeros((1, 3, 4, 3)))
     assert data["motion"][0][0]["step"] == [0.0, 0.0, 0.0]
     assert animation_data.quantisation_error(data) == (0.0, 0.0)
-
-
-def test_a_static_study_needs_no_time() -> None:
-    data = static(np.zeros((1, 3, 4, 3)))
     assert json.loads(json.dumps(data)) == data
-    assert (data["axis"]["name"], data["axis"]["unit"], data["axis"]["loops"]) == (
-        "load", "mm", False
-    )  # fmt: skip
+    assert [data["axis"][key] for key in ("name", "unit", "loops")] == ["load", "mm", False]
 
 
 def test_polygons_are_whole(study: StudyResults) -> None:

@@ -1,4 +1,5 @@
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,16 +25,12 @@ def pair() -> RigidUnits:
     )
 
 
-def test_centroids_of_padded_polygons(pair: RigidUnits) -> None:
-    np.testing.assert_allclose(pair.centroid, [[1, 1], [11, 1]], atol=1e-12)
-
-
 def test_a_unit_turns_about_its_centroid(pair: RigidUnits) -> None:
     displacement = np.array([[0.5, -0.25, np.pi / 2], [0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(pair.centroid, [[1, 1], [11, 1]], atol=1e-12)
     moved = rigid_units.deformed(pair, displacement)
-    np.testing.assert_allclose(
-        moved[0], [[2.5, -0.25], [2.5, 1.75], [0.5, 1.75], [0.5, -0.25]], atol=1e-12
-    )
+    there = [[2.5, -0.25], [2.5, 1.75], [0.5, 1.75], [0.5, -0.25]]
+    np.testing.assert_allclose(moved[0], there, atol=1e-12)
     np.testing.assert_array_equal(moved[1], TRIANGLE)
 
 
@@ -42,9 +39,8 @@ def test_absent_units_are_not_drawn_and_values_follow(pair: RigidUnits) -> None:
     vertices[0] = np.nan
     holed = dataclasses.replace(pair, vertices=vertices)
     axes = style.place(style.page(50.0), 5, 5, 40, 40)
-    drawn = draw(
-        axes, holed, values=np.array([1.0, 2.0]), colour_map=style.MAGNITUDE, norm=Normalize(0, 2)
-    )
+    shades: dict[str, Any] = {"colour_map": style.MAGNITUDE, "norm": Normalize(0, 2)}
+    drawn = draw(axes, holed, values=np.array([1.0, 2.0]), **shades)
     assert len(drawn.get_paths()) == 1
     values = drawn.get_array()
     assert values is not None
@@ -52,12 +48,9 @@ def test_absent_units_are_not_drawn_and_values_follow(pair: RigidUnits) -> None:
     assert np.shape(drawn.get_paths()[0].vertices) == (4, 2)  # three corners, closed
 
 
-def test_middle_of_the_top_edge(study: StudyResults) -> None:
+def test_middle_of_the_top_edge_of_an_even_one_the_left_of_two(study: StudyResults) -> None:
     full = rigid_units.from_dataset(study.design, study.scene.spacing)
     assert rigid_units.middle_of_top_edge(full) == 7 + 15 * 14
-
-
-def test_middle_of_an_even_edge_is_the_left_one_of_two() -> None:
     site = np.array([[i, j] for j in range(2) for i in range(4)], float) * 15.0
     empty = np.zeros((8, 0), int)
     plain = RigidUnits(np.zeros((8, 4, 2)), site, empty, empty, np.zeros(8, int), np.zeros(8, int))

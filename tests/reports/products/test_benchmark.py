@@ -15,12 +15,8 @@ from reports.__main__ import main
 from reports.base import style
 from reports.products.benchmark import charts, optimisers, tables, work_precision
 
-MACHINE = {
-    "processor": "abacus",
-    "cores": 2,
-    "date": "2026-01-01T00:00:00",
-    "commit": "0123456789abcdef",
-}
+MACHINE = {"processor": "abacus", "cores": 2, "date": "2026-01-01T00:00:00"}
+MACHINE |= {"commit": "0123456789abcdef"}
 
 
 def points(rows: list[tuple[str, str, str, int, float, float, str]]) -> xr.Dataset:
@@ -62,30 +58,21 @@ def precisions() -> xr.Dataset:
 
 
 def grown() -> xr.Dataset:
-    return points(
-        [
-            ("Newton, by size", f"{n} x {n}", "loss", n * n, 1e-6 * n**3, 1e-12, "measured")
-            for n in (15, 30, 60)
-        ]
-    )
+    name = "Newton, by size"
+    sizes = [(n, n * n, 1e-6 * n**3) for n in (15, 30, 60)]
+    return points([(name, f"{n} x {n}", "loss", m, t, 1e-12, "measured") for n, m, t in sizes])
 
 
 def swept() -> xr.Dataset:
     counts = (1, 10, 100)
-    made = points(
-        [("sweep", f"{n} cases", "loss", 225, 0.1 * n, 1e-12, "measured") for n in counts]
-    )
+    rows = [("sweep", f"{n} cases", "loss", 225, 0.1 * n, 1e-12, "measured") for n in counts]
     numbers = ("point", "work"), np.array(counts, dtype=float)[:, None]
-    return made.assign_coords(work=["cases"]).assign(count=numbers)
+    return points(rows).assign_coords(work=["cases"]).assign(count=numbers)
 
 
 def skipped() -> xr.Dataset:
-    return points(
-        [
-            ("inertia", "done", "loss", 25, 2.0, 1e-3, "measured"),
-            ("inertia", "skipped", "loss", 25, 0.1, 0.0, "measured"),
-        ]
-    )
+    times = (("done", 2.0, 1e-3), ("skipped", 0.1, 0.0))
+    return points([("inertia", s, "loss", 25, time, e, "measured") for s, time, e in times])
 
 
 def contest() -> xr.Dataset:

@@ -16,6 +16,8 @@ from reports.__main__ import main
 from reports.products.fabrication import pictures
 from reports.products.fabrication.renderer import Body, picture
 from tests.pipeline.fabrication import built
+from tests.reports.conftest import Failing
+from tests.tables import cases
 
 COLOUR = "#8d62c0"
 
@@ -61,12 +63,15 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def page_of(out: Path, *packages: Path) -> str:
+    words = ["--problem", built.PROBLEM, "--packages", *packages, "--out", out, "--quiet"]
+    assert main(["fabrication", *map(str, words)]) == 0
+    return out.read_text(encoding="utf-8")
+
+
 @pytest.fixture(scope="module")
 def page(package: Path) -> str:
-    out = package.with_name("index.html")
-    words = ["--problem", str(built.PROBLEM), "--packages", str(package), "--out", str(out)]
-    assert main(["fabrication", *words, "--quiet"]) == 0
-    return out.read_text(encoding="utf-8")
+    return page_of(package.with_name("index.html"), package)
 
 
 def test_the_page_shows_every_sheet_and_plate(package: Path, page: str) -> None:
@@ -92,41 +97,26 @@ def test_it_tells_the_figures_of_the_bill(page: str) -> None:
 
 
 def test_the_same_package_gives_the_same_page(package: Path, page: str, tmp_path: Path) -> None:
-    out = tmp_path / "again.html"
-    words = ["--problem", str(built.PROBLEM), "--packages", str(package), "--out", str(out)]
-    assert main(["fabrication", *words, "--quiet"]) == 0
-    assert out.read_text(encoding="utf-8") == page
+    assert page_of(tmp_path / "again.html", package) == page
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "told"),
-    [
-        ('"thin_walls_mm"', '"thin_walls"', "another version of the exporter"),
-        ("{", "", "the manifest cannot be read"),
-    ],
-)
+@cases("reports", "before, after, told")
 def test_a_package_of_another_version_makes_one_message(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], before: str, after: str, told: str
+    tmp_path: Path, failing: Failing, before: str, after: str, told: str
 ) -> None:
     folder = tmp_path / "cloaked"
     built.write(folder)
     path = folder / "manifest.json"
     path.write_text(path.read_text(encoding="utf-8").replace(before, after, 1), encoding="utf-8")
-    out = tmp_path / "index.html"
-    words = ["--problem", str(built.PROBLEM), "--packages", str(folder), "--out", str(out)]
-    assert main(["fabrication", *words, "--quiet"]) == 2
-    said = capsys.readouterr().err
+    words = ["--problem", built.PROBLEM, "--packages", folder]
+    said = failing("fabrication", tmp_path / "index.html", *words)
     assert told in said
     assert "make the package again" in said
-    assert not out.exists()
 
 
 def test_the_page_maps_the_shims_that_are_bent(tmp_path: Path) -> None:
     built.write(tmp_path / "cloaked", {"slots": {"direction": "centroid"}})
-    out = tmp_path / "index.html"
-    words = ["--problem", str(built.PROBLEM), "--packages", str(tmp_path / "cloaked")]
-    assert main(["fabrication", *words, "--out", str(out), "--quiet"]) == 0
-    page = out.read_text(encoding="utf-8")
+    page = page_of(tmp_path / "index.html", tmp_path / "cloaked")
     assert "Shims before any load" in page
     assert "3.0 %" in page
     assert "0 of 7 beyond 5 %" in page
@@ -140,9 +130,6 @@ def test_the_page_puts_losses_as_built_beside_those_as_designed(tmp_path: Path) 
         turns = {"turn_mean_deg": 0.39, "turn_max_deg": 4.59}
         losses = {"loss_as_designed": designed, "loss_as_built": built_loss}
         path.write_text(json.dumps(told | {"as_built": turns | losses}))
-    words = ["--problem", str(built.PROBLEM), "--out", str(tmp_path / "index.html"), "--packages"]
-    folders = [str(tmp_path / name) for name in ("altered", "cloaked")]
-    assert main(["fabrication", *words, *folders, "--quiet"]) == 0
-    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path / "index.html", tmp_path / "altered", tmp_path / "cloaked")
     for cell in ("0.39° on average, 4.59° at most", "0.0347", "0.111", "3.8 %", "12.3 %"):
         assert f"<td>{cell}</td>" in page

@@ -49,6 +49,9 @@ def test_it_works_from_disk_and_leads_to_what_is_there(html: str, results: Path)
     assert all(address.startswith("data:") for address in links.loaded)
     for href in links.hrefs.values():
         assert href[1:] in links.ids if href.startswith("#") else (results / href).is_file(), href
+    for data in inventory.reports(results)[0].datasets:
+        assert f"sha256 {data.sha256}" in html
+    assert page(results) == html
     wanted = {"fig2/report/index.html", "fig2/design.nc", "fig2/fabrication/index.html"}
     assert wanted | {"benchmark/fig2.csv", "stress/index.html"} <= set(links.hrefs.values())
 
@@ -64,15 +67,6 @@ def test_claims_are_judged_where_the_study_is_built(html: str) -> None:
     assert "<code>make fig7</code> builds it" in html
     tables = {table["name"]: table for table in index_report.tables(())}
     assert all(each.simulation.why == "study not built" for each in tables["fig2"]["claims"])
-
-
-def test_datasets_carry_their_hash(results: Path, html: str) -> None:
-    for data in inventory.reports(results)[0].datasets:
-        assert f"sha256 {data.sha256}" in html
-
-
-def test_it_is_the_same_again(results: Path, html: str) -> None:
-    assert page(results) == html
 
 
 def test_an_empty_folder_has_an_index_too(tmp_path: Path) -> None:
@@ -96,58 +90,30 @@ def test_movies_are_held_by_the_page_as_far_as_there_is_room(
     assert page(tmp_path) == shown
 
 
-def copied(results: Path, folder: Path) -> Path:
-    made = folder / "results"
-    shutil.copytree(results, made)
-    return made
+def flipped(content: bytes) -> bytes:
+    half = len(content) // 2
+    return content[:half] + bytes([content[half] ^ 1]) + content[half + 1 :]
 
 
-def edited(results: Path) -> None:
-    facts = results / "fig2/report/facts.json"
-    facts.write_text(facts.read_text(encoding="utf-8").replace('"value": ', '"value": 1', 1))
+FACTS, PAGE, RESPONSE = "fig2/report/facts.json", "fig2/report/index.html", "fig2/response.nc"
+Damage = Callable[[bytes], bytes]
+DAMAGES: dict[str, tuple[str, Damage, str]] = {
+    "edited": (FACTS, lambda old: old.replace(b'"value": ', b'"value": 1', 1), FACTS),
+    "cut": (FACTS, lambda old: old[:100], FACTS),
+    "flipped": (RESPONSE, flipped, RESPONSE),
+    "foreign": (PAGE, lambda _: b"<title>Another study</title>", FACTS),
+    "no text": (PAGE, lambda _: b"\xff\xfe\x00", PAGE),
+}
 
 
-def cut(results: Path) -> None:
-    facts = results / "fig2/report/facts.json"
-    facts.write_bytes(facts.read_bytes()[:100])
-
-
-def flipped(results: Path) -> None:
-    sealed = results / "fig2/response.nc"
-    content = bytearray(sealed.read_bytes())
-    content[len(content) // 2] ^= 1
-    sealed.write_bytes(content)
-
-
-def foreign(results: Path) -> None:
-    page = results / "fig2/report/index.html"
-    page.write_text("<title>Another study</title>")
-
-
-def no_text(results: Path) -> None:
-    (results / "fig2/report/index.html").write_bytes(b"\xff\xfe\x00")
-
-
-@pytest.mark.parametrize(
-    ("damage", "file"),
-    [
-        (edited, "fig2/report/facts.json"),
-        (cut, "fig2/report/facts.json"),
-        (flipped, "fig2/response.nc"),
-        (foreign, "fig2/report/facts.json"),
-        (no_text, "fig2/report/index.html"),
-    ],
-)
+@pytest.mark.parametrize(("damaged", "damage", "file"), DAMAGES.values(), ids=DAMAGES)
 def test_damage_is_one_message_and_the_rest_is_built(
-    damage: Callable[[Path], None],
-    file: str,
-    results: Path,
-    tmp_path: Path,
+    damaged: str, damage: Damage, file: str, results: Path, tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
-) -> None:
-    made = copied(results, tmp_path)
-    seal.write_seal(made / "fig2/response.nc")
-    damage(made)
+) -> None:  # fmt: skip
+    made = Path(shutil.copytree(results, tmp_path / "results"))
+    seal.write_seal(made / RESPONSE)
+    (made / damaged).write_bytes(damage((made / damaged).read_bytes()))
     assert main(["index", "--results", str(made)]) == 0
     told = capfd.readouterr().err
     assert told.count("left out: ") == 1

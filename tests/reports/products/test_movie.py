@@ -43,11 +43,8 @@ def test_load_cases_stand_in_columns_and_structures_in_rows() -> None:
     placed = layout(reel())
     where = [(cell.clip.name, cell.case, cell.row, cell.column) for cell in placed.cells]
     assert where == [("Altered", 0, 0, 0), ("Altered", 1, 0, 1), ("Cloaked", 0, 1, 0)]
-
-
-def test_structures_of_a_single_case_stand_side_by_side() -> None:
-    placed = layout(reel(1))
-    assert [(cell.row, cell.column) for cell in placed.cells] == [(0, 0), (0, 1)]
+    side_by_side = [(cell.row, cell.column) for cell in layout(reel(1)).cells]
+    assert side_by_side == [(0, 0), (0, 1)]
 
 
 def test_units_are_where_they_should_be_in_the_colour_of_their_motion() -> None:

@@ -7,23 +7,10 @@ from pathlib import Path
 import pytest
 
 from reports.__main__ import main
+from tests.reports.conftest import Failing
+from tests.tables import tables
 
-FAMILY = {
-    "name": "toy",
-    "tried_what": "two & more <cases>",
-    "judged_how": "by hand",
-    "tried": 1000,
-    "solved": 996,
-    "refused": 3,
-    "wrong": 1,
-    "in_range": 998,
-    "in_range_solved": 997,
-    "worst": [{"name": "off, mm", "value": 2.5e-7, "limit": 1e-6}],
-    "not_solved": [
-        {"case": "a", "verdict": "wrong", "wanted": "solution", "message": "off: 2, limit 1"},
-        {"case": "b", "verdict": "refused", "wanted": "refusal", "message": "no; try another"},
-    ],
-}
+FAMILY = tables("reports")["stress_family"]
 
 
 @pytest.fixture
@@ -40,6 +27,7 @@ def page(counts: Path, folder: Path) -> str:
 
 def test_the_page_shows_counts_and_what_was_not_solved(counts: Path, tmp_path: Path) -> None:
     html = page(counts, tmp_path / "page")
+    assert page(counts, tmp_path / "again") == html
     assert '<strong class="wrong">1</strong>' in html
     assert "two &amp; more &lt;cases&gt;" in html
     assert "99.8 %" in html  # 997 of 998, not rounded up
@@ -49,16 +37,9 @@ def test_the_page_shows_counts_and_what_was_not_solved(counts: Path, tmp_path: P
     assert [(row["name"], row["wrong"]) for row in rows] == [("toy", "1")]
 
 
-def test_the_same_counts_give_the_same_bytes(counts: Path, tmp_path: Path) -> None:
-    assert page(counts, tmp_path / "one") == page(counts, tmp_path / "other")
-
-
 @pytest.mark.parametrize("content", ["", "{}", '{"families": [{"name": "toy"}]}', "[1]"])
 def test_what_the_suite_did_not_write_is_refused(
-    content: str, counts: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    content: str, counts: Path, tmp_path: Path, failing: Failing
 ) -> None:
     counts.write_text(content, encoding="utf-8")
-    folder = tmp_path / "page"
-    assert main(["stress", "--counts", str(counts), "--out-dir", str(folder)]) == 2
-    assert str(counts) in capsys.readouterr().err
-    assert not (folder / "index.html").exists()
+    assert str(counts) in failing("stress", tmp_path / "page", "--counts", counts)

@@ -15,15 +15,18 @@ from pipeline.problem.reading import load_section
 from pipeline.runtime import ROOT
 from reports.__main__ import main
 from reports.products.validation.validation_report import relative_error
+from tests.reports.conftest import Failing
 
 FOLDER = ROOT / "experiments/validation"
 SIZES = {"quantile": 3, "sample": 3, "test": 3, "point": 6, "predicted": 4}
+CONSTANTS = ["axial_stiffness", "shear_stiffness", "bending_stiffness"]
+TESTS = ["tension", "compression", "shear"]
 NAMES = {
-    "constant": ["axial_stiffness", "shear_stiffness", "bending_stiffness"],
-    "with_constant": ["axial_stiffness", "shear_stiffness", "bending_stiffness"],
+    "constant": CONSTANTS,
+    "with_constant": CONSTANTS,
     "sample": ["s1", "s2", "s3"],
-    "test": ["tension", "compression", "shear"],
-    "curve": [f"{test}_s{k}" for test in ("tension", "compression", "shear") for k in (1, 2)],
+    "test": TESTS,
+    "curve": [f"{test}_s{k}" for test in TESTS for k in (1, 2)],
     "left_out_curve": ["shear_s1", "shear_s2"],
     "without": ["s1", "shear"],
 }
@@ -79,23 +82,16 @@ def test_it_says_who_measured_and_nothing_is_called_synthetic(page: str) -> None
     assert "SYNTHETIC" not in page
 
 
-def test_a_page_of_nothing_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["validation", "--out-dir", str(tmp_path / "page")]) != 0
-    assert "give --samples, --cycles or --pictures" in capsys.readouterr().err
-    assert not (tmp_path / "page").exists()
+def test_a_page_of_nothing_is_refused(tmp_path: Path, failing: Failing) -> None:
+    told = failing("validation", tmp_path / "page")
+    assert "give --samples, --cycles or --pictures" in told
 
 
 def test_it_tells_the_errors_and_their_sign(page: str) -> None:
+    assert "4.41 mm, -6.68 N to 5.05 mm, -0.07 N" in page
+    assert page.count("not simulated") == 2
+    assert "340 of 384 units are found" in page
+    assert "all parts agree with it within that" in page
     assert "the median is below the measured force everywhere" in page
     rms = 100 * np.sqrt((relative_error(made_up(), "median") ** 2).mean())
     assert f"<strong>{rms:.1f} %</strong><span>error of the median" in page
-
-
-def test_it_tells_snaps_and_loops(page: str) -> None:
-    assert "4.41 mm, -6.68 N to 5.05 mm, -0.07 N" in page
-    assert page.count("not simulated") == 2
-
-
-def test_it_tells_what_was_found_in_real_pictures(page: str) -> None:
-    assert "340 of 384 units are found" in page
-    assert "all parts agree with it within that" in page

@@ -26,7 +26,8 @@ def test_displacement_mimicking_is_the_papers_sum() -> None:
         assert float(losses[case]) == pytest.approx(wanted, rel=1e-13)
 
 
-def test_a_target_that_is_met_costs_nothing() -> None:
+def test_a_target_of_other_load_cases_is_refused() -> None:
+    """One that is met costs nothing."""
     units = np.array([3, 7, 20])
     measure = RelativeMimicking(units, 15.0, WEIGHTS, MOTION[:, :, units], np.ones(2))
     np.testing.assert_array_equal(measure(jnp.asarray(MOTION), RIG.values), 0.0)
