@@ -13,6 +13,7 @@ import pytest
 
 from pipeline.runtime import ROOT
 from pipeline.workflow.install_lock import uv_settings
+from tests.tables import cases
 
 SECRET = "user:hunter2"
 UV = "uv.data/scripts/uv"
@@ -107,20 +108,6 @@ def test_pip_installs_where_uv_fails(folder: Path) -> None:
     subprocess.run([folder / ".venv/bin/python", "-c", "import other"], check=True)
 
 
-@pytest.mark.parametrize(
-    ("listed", "settings"),
-    [
-        ("", {}),
-        (":env:.index-url=''", {}),
-        (
-            ":env:.index-url='https://a'\nglobal.index-url='https://b'\ninstall.index-url='https://c'",
-            {"UV_DEFAULT_INDEX": "https://a"},
-        ),
-        ("global.extra-index-url='file:///a\\nhttps://b'", {"UV_INDEX": "file:///a https://b"}),
-        ("global.find-links='/ https://b file:///not/there'", {"UV_FIND_LINKS": "/,https://b"}),
-        (":env:.default-timeout='180'\nlist.format='columns'", {"UV_HTTP_TIMEOUT": "180"}),
-        ("user.proxy='x'", {}),
-    ],
-)
+@cases("workflow", "listed, settings")
 def test_settings_of_pip_become_those_of_uv(listed: str, settings: dict[str, str]) -> None:
     assert uv_settings(listed) == settings

@@ -9,7 +9,9 @@ from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.tracking.frames import import_video
 from pipeline.tracking.geometry import outlines_of_design
+from tests.pipeline.conftest import Failing
 from tests.pipeline.virtual_lab.conftest import GRID
+from tests.tables import cases
 
 SMALL = GRID | {"grid": [4, 4]}
 ORIGIN, ROTATION = np.array([100.0, 40.0]), np.deg2rad(30.0)
@@ -60,24 +62,11 @@ def test_points_become_the_motions_of_their_units(export: tuple[Path, np.ndarray
     assert out.with_suffix(".csv").exists()
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
-        (AXES, "", "units bear points"),
-        ("X [mm]", "Z [mm]", "columns are missing"),
-        ("dic.csv", "none.csv", "no such file"),
-        ("rotation: 30 deg", "rotation: 30", "rotation"),
-    ],
-)
+@cases("tracking", "old, new, told")
 def test_points_that_do_not_fit_are_refused(
-    export: tuple[Path, np.ndarray],
-    capsys: pytest.CaptureFixture[str],
-    old: str,
-    new: str,
-    told: str,
+    export: tuple[Path, np.ndarray], failing: Failing, old: str, new: str, told: str
 ) -> None:
     path, _ = export
     path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
-    assert run_stage("track", ["points", str(path), "--out", str(path.with_name("track.nc"))]) == 2
-    assert told in capsys.readouterr().err
-    assert not path.with_name("track.nc").exists()
+    words = ["points", str(path), "--out", str(path.with_name("track.nc"))]
+    assert told in failing("track", words)

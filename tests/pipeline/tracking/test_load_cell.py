@@ -1,12 +1,11 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from pipeline.problem.fields import csv_columns
-from pipeline.runtime import UserError
 from pipeline.tracking.frames import load_cell
 from pipeline.tracking.frames.recording import LoadCellLog
+from tests.tables import cases, refused
 
 TIME = np.arange(5) / 10
 
@@ -34,22 +33,13 @@ def test_a_fine_log_is_averaged_over_each_frame(tmp_path: Path) -> None:
     np.testing.assert_allclose(found[1:4], 3.0 + TIME[1:4], atol=0.02)
 
 
-@pytest.mark.parametrize(
-    ("text", "offset", "told"),
-    [
-        ("time,load\n0,1\n", 0.0, "columns are missing"),
-        ("time,force\nx,y\n", 0.0, "no line holds numbers"),
-        ("time,force\n0,1\n0,2\n1,2\n", 0.0, "does not ascend"),
-        ("time,force\n0,1\n1,2\n", 50.0, "do not overlap"),
-    ],
-)
+@cases("tracking", "text, offset, told")
 def test_a_faulty_log_is_refused(tmp_path: Path, text: str, offset: float, told: str) -> None:
     path, cell = log(tmp_path, text), LoadCellLog(file="load.csv", offset=offset)
-    with pytest.raises(UserError, match=told) as caught:
+    with refused(told):
         load_cell.check(load_cell.read(path, cell), TIME, path, cell)
-    assert caught.value.remedy
 
 
 def test_a_log_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="no such file"):
+    with refused("no such file"):
         csv_columns.read_columns(tmp_path / "none.csv", ["a"])

@@ -39,9 +39,8 @@ def test_a_proposal_is_a_recording_and_a_picture(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = str(tmp_path)
-    assert (
-        run_stage("track", ["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", folder]) == 0
-    )
+    words = ["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", folder]
+    assert run_stage("track", words) == 0
     words = ["init", str(CLIPS / "f_silhouette.mp4"), "--out-dir", folder]
     words += ["--design", str(tmp_path / "f_silhouette_design.nc")]
     assert run_stage("track", words) == 0

@@ -7,6 +7,7 @@ import pytest
 from pipeline import datasets
 from pipeline.__main__ import run_stage
 from tests.pipeline.tracking.conftest import CLIPS
+from tests.tables import cases
 
 VIDEO = str(CLIPS / "f_silhouette.mp4")
 
@@ -14,10 +15,8 @@ VIDEO = str(CLIPS / "f_silhouette.mp4")
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
     """The bare clip, imported."""
-    assert (
-        run_stage("track", ["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", str(tmp_path)])
-        == 0
-    )
+    words = ["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", str(tmp_path)]
+    assert run_stage("track", words) == 0
     return tmp_path / "f_silhouette_recording.yaml"
 
 
@@ -65,13 +64,7 @@ def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
     assert "drive_displacement" in made.coords
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
-        ("grid:\n- 15\n", "grid:\n- 14\n", "of 210 in their places, from ("),
-        ("bias_angle_deg: 20", "bias_angle_deg: 8", "225 units are hidden or not as the design"),
-    ],
-)
+@cases("tracking", "old, new, told")
 def test_another_design_is_refused(
     recording: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, told: str
 ) -> None:
@@ -104,18 +97,7 @@ def test_a_lattice_that_looks_the_same_turned_is_as_the_recording_says(
     assert "do not overlap: the track is kept" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
-        ("", "mirrored: true\n", "the specimen is seen otherwise: upright"),
-        ("pixel_size: 0.365 mm", "pixel_size: 0.6 mm", "pixels measure about 0.36"),
-        (VIDEO, str(CLIPS / "README.md"), "not a readable video"),
-        (VIDEO, "black.mkv", "black or without contrast"),
-        ("pixel_size: 0.365 mm", "pixel_size: 0.365", "pixel_size"),
-        ("", "load_axis: driven displacement\n", "the design has no driven units"),
-        ("", "load_cell: {file: none.csv}\n", "none.csv"),
-    ],
-)
+@cases("tracking", "old, new, told")
 def test_a_recording_that_cannot_be_tracked_is_refused(
     recording: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, told: str
 ) -> None:
@@ -126,7 +108,7 @@ def test_a_recording_that_cannot_be_tracked_is_refused(
         container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
     if old:
-        changed(recording, old, new)
+        changed(recording, old.replace("VIDEO", VIDEO), new)
     else:
         extended(recording, new)
     words = refused(recording, capsys)
@@ -134,15 +116,7 @@ def test_a_recording_that_cannot_be_tracked_is_refused(
     assert "units;" not in words  # before tracking
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["frobnicate", "a.mp4"], "no such command"),
-        (["init", "a.mp4"], "--design is wanted"),
-        (["a.yaml"], "--out is wanted"),
-        (["a.mp4", "--out", "a.nc"], "pipeline track init a.mp4"),
-    ],
-)
+@cases("tracking", "words, told")
 def test_a_command_that_lacks_something_is_told_what(
     words: list[str], told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -29,6 +29,11 @@ def _made(motion: Floats, noise: Floats, told: float, seed: int) -> Floats:
     return np.asarray(error[1:] / sigma[1:])
 
 
+def assert_spread(standard: Floats, low: float, high: float) -> None:
+    spread = standard.std(axis=(0, 1))
+    assert ((low < spread) & (spread < high)).all()
+
+
 def _rough(frames: int, seed: int = 1) -> Floats:
     """Neighbours turn against each other, and each by its own amount; several such shapes."""
     random = np.random.default_rng(seed)
@@ -40,18 +45,12 @@ def _rough(frames: int, seed: int = 1) -> Floats:
 
 @pytest.mark.parametrize("told", [1.0, 2.5, 5.0])
 def test_rough_shapes_of_a_cloaked_structure_are_motion(told: float) -> None:
-    standard = _made(_rough(80), np.full(80, 0.05), told, 2)
-    spread = standard.std(axis=(0, 1))
-    assert (spread > HONEST[0]).all()
-    assert (spread < HONEST[1]).all()
+    assert_spread(_made(_rough(80), np.full(80, 0.05), told, 2), *HONEST)
 
 
 def test_smooth_shapes_are_motion_however_small() -> None:
     smooth = np.sin(np.linspace(0, 6, 60))[:, None] * np.cos(CENTRE[:, 0] / 60) * 0.2
-    standard = _made(smooth, np.full(60, 0.05), 2.5, 3)
-    spread = standard.std(axis=(0, 1))
-    assert (spread > HONEST[0]).all()
-    assert (spread < HONEST[1]).all()
+    assert_spread(_made(smooth, np.full(60, 0.05), 2.5, 3), *HONEST)
 
 
 def test_what_noise_drifts_by_at_rest_is_no_motion() -> None:
@@ -59,9 +58,7 @@ def test_what_noise_drifts_by_at_rest_is_no_motion() -> None:
     drift = np.cumsum(0.02 * random.normal(size=(40, len(CENTRE), 3)), axis=0)
     image = np.full_like(drift, 0.05)
     sigma = uncertainty.calibrate_sigma(drift, image, CENTRE, np.ones(40, bool))
-    spread = (drift / sigma).std(axis=(0, 1))
-    assert (spread > 0.7).all()
-    assert (spread < 1.5).all()
+    assert_spread(drift / sigma, 0.7, 1.5)
 
 
 def test_a_long_recording_at_rest_in_its_beginning_is_judged_by_parts() -> None:
