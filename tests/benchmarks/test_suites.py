@@ -6,18 +6,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from benchmarks import suites
 from benchmarks.harness import errors
 from benchmarks.methods import jax_baseline
 from benchmarks.scenes import paper_scenes
-from benchmarks.suites import (
-    FEASIBLE,
-    OPTIMISERS,
-    SKIPS,
-    OptimiserBudget,
-    Skip,
-    prepare,
-    sweep_growth,
-)
 from sim.core import Floats
 from sim.energy import gradient, kinematics_of, system_of
 from sim.scene import concrete_parameters, parameters_of_design
@@ -28,34 +20,38 @@ COMPILED = ("compilation", "fresh factors")
 
 
 @pytest.mark.parametrize(
-    "skip", [skip for skip in SKIPS if skip.name not in COMPILED], ids=lambda skip: skip.name
+    "skip", [skip for skip in suites.SKIPS if skip.name not in COMPILED], ids=lambda skip: skip.name
 )
-def test_a_skip_changes_nothing_beyond_its_tolerance(skip: Skip) -> None:
+def test_a_skip_changes_nothing_beyond_its_tolerance(skip: suites.Skip) -> None:
     name = "small_wave" if skip.wave else "small_push"
     done, skipped = (skip.prepare(name, made, "loss")().values for made in (0.0, 1.0))
     refuse_change(skip, done, skipped)
 
 
-def refuse_change(skip: Skip, done: Mapping[str, Floats], skipped: Mapping[str, Floats]) -> None:
+def refuse_change(
+    skip: suites.Skip, done: Mapping[str, Floats], skipped: Mapping[str, Floats]
+) -> None:
     changes = errors(done, skipped)
     assert changes.keys() == done.keys() == skipped.keys()
     assert max(changes.values()) <= skip.tolerance
 
 
-@pytest.mark.parametrize("optimiser", OPTIMISERS)
+@pytest.mark.parametrize("optimiser", suites.OPTIMISERS)
 def test_an_optimiser_lowers_the_loss(optimiser: str) -> None:
-    course = prepare("small_push", OptimiserBudget(evaluations=30), optimiser)().values
+    course = suites.prepare(
+        "small_push", suites.OptimiserBudget(evaluations=30), optimiser
+    )().values
     best = course["best"][np.isfinite(course["best"])]
     assert len(course["loss"]) <= 30
     assert np.all(np.diff(best) <= 0.0)
     assert course["final"] == pytest.approx(best[-1], rel=1e-6)
     assert course["final"] < 0.9 * course["loss"][0]
-    feasible = course["loss"][course["violation"] <= FEASIBLE]
+    feasible = course["loss"][course["violation"] <= suites.FEASIBLE]
     assert feasible.min() == best[-1]
 
 
 def test_a_case_does_not_depend_on_those_after_it() -> None:
-    alone, three = (sweep_growth.cases("quick", count)() for count in (1, 3))
+    alone, three = (suites.sweep_growth.cases("quick", count)() for count in (1, 3))
     assert (alone.work, three.work) == ({"cases": 1}, {"cases": 3})
     assert np.isfinite(alone.values["loss"]).all()
     np.testing.assert_array_equal(alone.values["loss"], three.values["loss"])

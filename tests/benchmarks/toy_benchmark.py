@@ -6,41 +6,31 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.harness import (
-    Method,
-    Run,
-    Sample,
-    Suite,
-    Target,
-    error_of,
-    in_turn,
-    seconds_of,
-    time_ratio,
-)
+from benchmarks import harness
 
 
-def exact() -> Run:
+def exact() -> harness.Run:
     values = {"loss": np.asarray(np.e - 1), "gradient@stretch": np.ones(1), "loss@half": np.ones(1)}
-    return lambda: Sample(values, {})
+    return lambda: harness.Sample(values, {})
 
 
-def trapezoids(n: float, task: str = "") -> Run:
+def trapezoids(n: float, task: str = "") -> harness.Run:
     del task
     x = np.linspace(0.0, 1.0, int(n))
 
-    def run() -> Sample:
+    def run() -> harness.Sample:
         loss, gradient = np.trapezoid(np.exp(x), x), np.trapezoid(x * np.exp(x), x)
         values = {"loss": np.asarray(loss), "gradient@stretch": np.array([gradient])}
-        return Sample(values, {"evaluations": int(n)})
+        return harness.Sample(values, {"evaluations": int(n)})
 
     return run
 
 
-def slow_at_setting(setting: float, task: str) -> Run:
+def slow_at_setting(setting: float, task: str) -> harness.Run:
     """Makes a run that is busy for ten seconds unless the setting is zero."""
     del task
 
-    def run() -> Sample:
+    def run() -> harness.Sample:
         end = time.process_time() + (10.0 if setting else 0.0)
         while time.process_time() < end:
             pass
@@ -49,43 +39,45 @@ def slow_at_setting(setting: float, task: str) -> Run:
     return run
 
 
-def fails_at_first(n: float, task: str) -> Run:
+def fails_at_first(n: float, task: str) -> harness.Run:
     if n == 0.0:
         raise ArithmeticError("too loose")
     return trapezoids(n, task)
 
 
-def raises_when_run() -> Run:
-    def run() -> Sample:
+def raises_when_run() -> harness.Run:
+    def run() -> harness.Sample:
         raise ValueError("no such integral")
 
     return run
 
 
-def raises_when_prepared() -> Run:
+def raises_when_prepared() -> harness.Run:
     raise ImportError("no such method")
 
 
-def dies() -> Run:
+def dies() -> harness.Run:
     return lambda: os._exit(3)
 
 
-def suite(*more: Method) -> Suite:
+def suite(*more: harness.Method) -> harness.Suite:
     fine = {"repeats": 1, "share": 0.25, "baseline": True, "note": "scaled"}
-    return in_turn(
+    return harness.in_turn(
         "toy",
         "integral of exp",
         ("the exact one", exact),
         (
-            Method("coarse", partial(trapezoids, 11)),
-            Method("fine", partial(trapezoids, 1001), **fine),  # type: ignore[arg-type]
+            harness.Method("coarse", partial(trapezoids, 11)),
+            harness.Method("fine", partial(trapezoids, 1001), **fine),  # type: ignore[arg-type]
             *more,
         ),
         (
-            Target("loss error", error_of("coarse", "loss"), at_most=1e-3),
-            Target("fine loss error", error_of("fine", "loss"), at_most=1e-9, aim=1e-12),
-            Target("time", seconds_of("coarse"), "s", at_least=0.0),
-            Target("speed", time_ratio("absent", "coarse"), at_least=2),
+            harness.Target("loss error", harness.error_of("coarse", "loss"), at_most=1e-3),
+            harness.Target(
+                "fine loss error", harness.error_of("fine", "loss"), at_most=1e-9, aim=1e-12
+            ),
+            harness.Target("time", harness.seconds_of("coarse"), "s", at_least=0.0),
+            harness.Target("speed", harness.time_ratio("absent", "coarse"), at_least=2),
         ),
         units=4,
     )

@@ -5,27 +5,19 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipeline import datasets, problem
+from pipeline import datasets, posing, problem
 from pipeline.datasets import provenance
 from pipeline.datasets.tables import TABLES
-from pipeline.posing import (
-    case_directions,
-    lattice_of,
-    network_variables,
-    scene_of,
-    spread,
-    unit_coordinates,
-)
 from pipeline.posing.to_scene import altered_lattice_of
 
 
 def write(path: Path) -> Path:
     """Writes design.nc beside a problem file."""
     asked = problem.load(path)
-    intact, altered = lattice_of(asked), altered_lattice_of(asked)
-    vertices = spread(altered.padded(altered.vertices), altered, intact.n_units)
+    intact, altered = posing.lattice_of(asked), altered_lattice_of(asked)
+    vertices = posing.spread(altered.padded(altered.vertices), altered, intact.n_units)
     labels = {
-        "case": len(case_directions(asked)),
+        "case": len(posing.case_directions(asked)),
         "method": 1,
         "evaluation": 1,
         "variable": 1,
@@ -38,16 +30,16 @@ def write(path: Path) -> Path:
     }
     design = xr.Dataset(
         plain
-        | network_variables(asked, scene_of(asked, path.parent))
+        | posing.network_variables(asked, posing.scene_of(asked, path.parent))
         | {
             "vertices": (("unit", "vertex", "xy"), vertices),
             "vertices_initial": (("unit", "vertex", "xy"), intact.padded(intact.vertices)),
             "end_angles": (("ligament", "end"), np.full((intact.n_ligaments, 2), np.nan)),
             "centroid": (("unit", "xy"), vertices.mean(axis=1)),
         },
-        unit_coordinates(intact)
+        posing.unit_coordinates(intact)
         | {
-            "direction": ("case", np.rad2deg(case_directions(asked))),
+            "direction": ("case", np.rad2deg(posing.case_directions(asked))),
             "method": ["sqp"],
             "evaluation": [0],
             "constraint": np.zeros(0, "U1"),

@@ -14,17 +14,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.calibration import computed_sets, computed_track, estimates, fit_uncertainty
+from pipeline.calibration import computed_sets, computed_track, estimates, fit_uncertainty, inputs
 from pipeline.calibration.experiments import Experiment, force_displacement, free_decay, full_field
 from pipeline.calibration.fit_constants import fit_settled
-from pipeline.calibration.inputs import (
-    Calibration,
-    Constants,
-    ForceDisplacement,
-    FreeDecay,
-    TrackedMotion,
-    start_constants,
-)
 from pipeline.calibration.least_squares import FitModel
 from pipeline.runtime import ROOT
 from sim.core import Floats
@@ -49,18 +41,18 @@ Draw = Callable[[np.random.Generator], list[Experiment]]
 class Case(NamedTuple):
     """A calibration, its true constants, draws of data with noise, and data that know theirs."""
 
-    asked: Calibration
-    true: Constants
+    asked: inputs.Calibration
+    true: inputs.Constants
     draw: Draw
     known: Sequence[Experiment]
 
 
 def forces_case(folder: Path) -> Case:
     asked = loaded(folder, described(force_sets(points=12), STIFFNESS))
-    begin, true = start_constants(asked), computed_sets.true_constants(asked)
+    begin, true = inputs.start_constants(asked), computed_sets.true_constants(asked)
     clean: list[tuple[force_displacement.ForceTest, Floats, float]] = []
     for each in asked.data:
-        assert isinstance(each, ForceDisplacement)
+        assert isinstance(each, inputs.ForceDisplacement)
         assert each.virtual is not None
         along = np.linspace(0.0, each.virtual.end, each.virtual.points + 1)[1:]
         test = force_displacement.pose_force_test(each, begin, along, np.zeros(len(along)))
@@ -83,7 +75,7 @@ def forces_case(folder: Path) -> Case:
 def decay_case(folder: Path) -> Case:
     asked = loaded(folder, described([decay_set()], ["damping_ratio"]))
     true, each = computed_sets.true_constants(asked), asked.data[0]
-    assert isinstance(each, FreeDecay)
+    assert isinstance(each, inputs.FreeDecay)
     assert each.virtual is not None
 
     def draw(random: np.random.Generator) -> list[Experiment]:
@@ -121,8 +113,12 @@ def _track_case(
         "virtual": {"rate": rate, "noise": error, "bias": error},
     }
     asked = loaded(folder, described([track], wanted, material=begin_of))
-    begin, true, each = start_constants(asked), computed_sets.true_constants(asked), asked.data[0]
-    assert isinstance(each, TrackedMotion)
+    begin, true, each = (
+        inputs.start_constants(asked),
+        computed_sets.true_constants(asked),
+        asked.data[0],
+    )
+    assert isinstance(each, inputs.TrackedMotion)
 
     def seen(made: xr.Dataset) -> full_field.FullFieldExperiment:
         return full_field.pose_track(each, folder, begin, made)
@@ -158,14 +154,14 @@ def tried(case: Case) -> Trials:
 
 
 def _estimated(case: Case, random: np.random.Generator) -> estimates.Estimate:
-    model = FitModel(start_constants(case.asked), case.asked.fit, case.draw(random))
+    model = FitModel(inputs.start_constants(case.asked), case.asked.fit, case.draw(random))
     found = fit_settled(model)
     return estimates.estimate_constants(found, fit_uncertainty.estimate_errors(found))
 
 
 def _bound(case: Case) -> Floats:
     """Standard errors of the wanted constants by the bound of Cramer and Rao."""
-    model = FitModel(start_constants(case.asked), case.asked.fit, case.known)
+    model = FitModel(inputs.start_constants(case.asked), case.asked.fit, case.known)
     own = model.start[len(case.asked.fit) :]
     jacobian = model.jacobian(np.append(case.true.logs(case.asked.fit), own))
     covariance = np.linalg.inv(jacobian.T @ jacobian)

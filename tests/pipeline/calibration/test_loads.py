@@ -12,13 +12,7 @@ from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import ROOT
-from tests.pipeline.calibration.specimens import (
-    TRUTH,
-    described,
-    force_sets,
-    synthesised,
-    written,
-)
+from tests.pipeline.calibration import specimens
 from tests.tables import cases
 
 SPECIMENS = ROOT / "experiments/calibration/specimens"
@@ -31,7 +25,7 @@ CONTACT = {
     "cutoff_angle": "5 deg",
 }
 
-START = TRUTH | {"shear_stiffness": "1.1 N/mm", "bending_stiffness": "1.6 N mm/rad"}
+START = specimens.TRUTH | {"shear_stiffness": "1.1 N/mm", "bending_stiffness": "1.6 N mm/rad"}
 Output = pytest.CaptureFixture[str]
 READINGS = {"displacement": units.LENGTH, "force": units.FORCE}
 WANTED = ["shear_stiffness", "bending_stiffness"]
@@ -50,8 +44,8 @@ def assert_inside(found: xr.Dataset, true: dict[str, float]) -> None:
 
 
 def test_the_zero_of_a_load_cell_is_found(tmp_path: Path) -> None:
-    sets = [each | {"tare": True} for each in force_sets()[1:]]
-    path = synthesised(tmp_path, described(sets, WANTED, material=START))
+    sets = [each | {"tare": True} for each in specimens.force_sets()[1:]]
+    path = specimens.synthesised(tmp_path, specimens.described(sets, WANTED, material=START))
     for each in sets:
         file = tmp_path / f"data/{each['name']}.csv"
         along, force = csv_columns.read_quantities(file, READINGS).T
@@ -63,16 +57,16 @@ def test_the_zero_of_a_load_cell_is_found(tmp_path: Path) -> None:
 
 
 def test_the_cutoff_of_contact_is_found(tmp_path: Path) -> None:
-    deep = force_sets(points=24)[1]
+    deep = specimens.force_sets(points=24)[1]
     deep["virtual"]["end"] = "6.5 mm"
-    asked = described(
+    asked = specimens.described(
         [deep],
         ["bending_stiffness", "contact_cutoff"],
-        material=TRUTH | {"bending_stiffness": "1.8 N mm/rad"},
+        material=specimens.TRUTH | {"bending_stiffness": "1.8 N mm/rad"},
         contact=CONTACT,
-        virtual={"truth": TRUTH, "cutoff_angle": "12 deg", "seed": 1},
+        virtual={"truth": specimens.TRUTH, "cutoff_angle": "12 deg", "seed": 1},
     )
-    found = found_from(synthesised(tmp_path, asked), tmp_path)
+    found = found_from(specimens.synthesised(tmp_path, asked), tmp_path)
     assert_inside(found, {"bending_stiffness": 1.5, "contact_cutoff": np.deg2rad(12)})
     assert (found["status"] == 0).all()
 
@@ -96,8 +90,8 @@ def test_loads_that_are_refused(
     problem: str, changed: dict[str, Any], told: str, tmp_path: Path, capsys: Output
 ) -> None:
     shutil.copy(SPECIMENS / problem, tmp_path)
-    asked = described([track(problem=problem, **changed)], WANTED, material=START)
-    path, folder = written(tmp_path, asked), tmp_path / "data"
+    asked = specimens.described([track(problem=problem, **changed)], WANTED, material=START)
+    path, folder = specimens.written(tmp_path, asked), tmp_path / "data"
     failed = run_stage("calibrate", ["synthesise", str(path), "--out-dir", str(folder), "--quiet"])
     if not failed:
         path = folder / "calibration.yaml"

@@ -4,18 +4,12 @@ from functools import partial
 
 import numpy as np
 
+from pipeline.comparison import curves
 from pipeline.comparison.compared_quantities import (
     Quantity,
     mean_approach,
     mean_rotation,
     normalised_rms,
-)
-from pipeline.comparison.curves import (
-    Sides,
-    estimate_peaks,
-    expected_coverage,
-    peak_to_peak,
-    quantity_curve,
 )
 
 FRAMES, UNITS, NOISE = 60, 40, 0.02
@@ -24,32 +18,32 @@ PHASE = np.linspace(0, 3, 3 * UNITS).reshape(UNITS, 3)
 WAVES = np.sin(4 * np.pi * TIME[:, None, None] - PHASE)
 
 
-def sides(measured: np.ndarray, noise: float = NOISE, gain: float = 1.0) -> Sides:
+def sides(measured: np.ndarray, noise: float = NOISE, gain: float = 1.0) -> curves.Sides:
     """Of waves that are seen with noise; the copies of the simulated side differ in size."""
     seen = measured + noise * np.random.default_rng(2).standard_normal(measured.shape)
     sigma = np.full(measured.shape, noise)
     copies = np.stack([share * gain * WAVES for share in np.linspace(0.9, 1.1, 64)])
-    return Sides(seen, sigma, gain * WAVES, gain * WAVES, copies, 0.95)
+    return curves.Sides(seen, sigma, gain * WAVES, gain * WAVES, copies, 0.95)
 
 
 def test_a_peak_between_frames_is_not_missed() -> None:
     off = np.linspace(-0.5, 0.5, 33).reshape(11, 3)
     hill = 1 - 0.05 * (np.arange(-4, 5)[:, None, None] - off) ** 2
-    np.testing.assert_allclose(peak_to_peak(hill), 1 - hill.min(axis=0), atol=1e-12)
-    np.testing.assert_allclose(peak_to_peak(-hill), 1 - hill.min(axis=0), atol=1e-12)
-    np.testing.assert_allclose(peak_to_peak(WAVES), 2.0, atol=0.02)
+    np.testing.assert_allclose(curves.peak_to_peak(hill), 1 - hill.min(axis=0), atol=1e-12)
+    np.testing.assert_allclose(curves.peak_to_peak(-hill), 1 - hill.min(axis=0), atol=1e-12)
+    np.testing.assert_allclose(curves.peak_to_peak(WAVES), 2.0, atol=0.02)
 
 
 def test_units_that_are_seldom_seen_have_no_peaks() -> None:
     seen = WAVES.copy()
     seen[:9, 0], seen[20, 1] = np.nan, np.nan
-    found = peak_to_peak(seen)
+    found = curves.peak_to_peak(seen)
     assert np.isnan(found[0]).all()
     np.testing.assert_allclose(found[1:], 2.0, atol=0.02)
 
 
 def test_intervals_of_peaks_hold_the_truth_though_noise_makes_them_larger() -> None:
-    found = estimate_peaks(sides(WAVES), np.random.default_rng(0))
+    found = curves.estimate_peaks(sides(WAVES), np.random.default_rng(0))
     value, low, high = np.moveaxis(found[0], -1, 0)
     assert value.mean() > 2.0 + 0.5 * NOISE
     assert ((low <= 2.0) & (high >= 2.0)).mean() > 0.9
@@ -61,7 +55,7 @@ def test_a_departure_is_that_from_the_other_motion() -> None:
     intact = WAVES
     of = partial(normalised_rms, spacing=15.0, unit=normalised_rms(intact, 15.0).max())
     known = Quantity(of, np.arange(0, UNITS, 2), intact)
-    found = quantity_curve(
+    found = curves.quantity_curve(
         sides(1.1 * WAVES, noise=1e-4, gain=1.2), known, np.random.default_rng(0)
     )
     exact = 0.1 * normalised_rms(intact[:, ::2], 15.0) / normalised_rms(intact, 15.0).max()
@@ -76,19 +70,21 @@ def test_units_that_stand_for_no_others_are_not_drawn() -> None:
     """Then the interval is that of the noise alone: here of the means of two rows."""
     rows = np.arange(10)
     apart = Quantity(partial(mean_approach, lower=5), rows, sampled=False)
-    found = quantity_curve(sides(WAVES), apart, np.random.default_rng(0))
+    found = curves.quantity_curve(sides(WAVES), apart, np.random.default_rng(0))
     exact = WAVES[:, :5, 1].mean(axis=1) - WAVES[:, 5:10, 1].mean(axis=1)
     np.testing.assert_allclose(found[1, :, 0], exact, atol=1e-12)
     wide = (found[0, :, 2] - found[0, :, 1]).mean()
     np.testing.assert_allclose(wide, 2 * 1.96 * NOISE * np.sqrt(2 / 5), rtol=0.1)
-    drawn = quantity_curve(sides(WAVES), Quantity(mean_rotation, rows), np.random.default_rng(0))
+    drawn = curves.quantity_curve(
+        sides(WAVES), Quantity(mean_rotation, rows), np.random.default_rng(0)
+    )
     assert (drawn[0, :, 2] - drawn[0, :, 1]).mean() > 0.1
 
 
 def test_copies_that_are_off_as_a_whole_leave_the_band_as_a_whole() -> None:
     seen = sides(WAVES)
-    together = expected_coverage(seen.copies, seen.within(seen.copies), 0.99)
+    together = curves.expected_coverage(seen.copies, seen.within(seen.copies), 0.99)
     assert (together < 0.01).all()
     apart = np.random.default_rng(1).standard_normal(seen.copies.shape)
-    found = expected_coverage(apart, seen.within(apart), seen.level)
+    found = curves.expected_coverage(apart, seen.within(apart), seen.level)
     np.testing.assert_allclose(found, 0.95, atol=0.03)

@@ -8,53 +8,43 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sim import structure
 from sim.constraints import ConstraintVector, Limits, margins
 from sim.constraints.manufacturability import separation, void_angle
 from sim.core import Floats
 from sim.optimise import SqpOptions, minimise
-from sim.structure import (
-    DesignSpace,
-    Lattice,
-    SlotRoom,
-    Symmetry,
-    design_space,
-    overlapping_pairs,
-    quads,
-    smallest_gap,
-    void_angles,
-)
 from tests.sim.structures import RING, central
 
-ROOM = SlotRoom(grip=1.0, depth=5.0, width=0.45, wall=0.8, tip=0.1)
+ROOM = structure.SlotRoom(grip=1.0, depth=5.0, width=0.45, wall=0.8, tip=0.1)
 LIMITS = Limits(
     edge_length=5.0, block_angle=np.pi / 6, convex=True, void_angle=0.0, gap=0.2, slots=ROOM
 )
 
 
 @pytest.fixture(scope="module")
-def lattice() -> Lattice:
-    return quads(5, 5, 15.0, 2.25, np.deg2rad(20))
+def lattice() -> structure.Lattice:
+    return structure.quads(5, 5, 15.0, 2.25, np.deg2rad(20))
 
 
 @pytest.fixture(scope="module")
-def space(lattice: Lattice) -> DesignSpace:
-    return design_space(lattice, RING, np.array([12]))
+def space(lattice: structure.Lattice) -> structure.DesignSpace:
+    return structure.design_space(lattice, RING, np.array([12]))
 
 
 @pytest.fixture(scope="module")
-def constraints(space: DesignSpace) -> ConstraintVector:
+def constraints(space: structure.DesignSpace) -> ConstraintVector:
     return ConstraintVector(space, LIMITS)
 
 
-def random_design(space: DesignSpace, size: float, seed: int = 0) -> np.ndarray:
+def random_design(space: structure.DesignSpace, size: float, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-size, size, space.n_variables)
 
 
 @pytest.mark.parametrize("symmetry", ["none", "C4"])
 def test_sparse_jacobian_is_that_of_the_plain_definition(
-    lattice: Lattice, symmetry: Symmetry
+    lattice: structure.Lattice, symmetry: structure.Symmetry
 ) -> None:
-    space = design_space(lattice, RING, np.array([12]), symmetry)
+    space = structure.design_space(lattice, RING, np.array([12]), symmetry)
     constraints = ConstraintVector(space, replace(LIMITS, slots=None))
     design = random_design(space, 0.8)
 
@@ -70,7 +60,7 @@ def test_sparse_jacobian_is_that_of_the_plain_definition(
 
 
 def test_jacobian_agrees_with_central_differences(
-    space: DesignSpace, constraints: ConstraintVector
+    space: structure.DesignSpace, constraints: ConstraintVector
 ) -> None:
     design, way = random_design(space, 0.8), random_design(space, 1.0, seed=1)
     slope = central(lambda step: constraints.values(design + step * way), 1e-6)
@@ -78,7 +68,7 @@ def test_jacobian_agrees_with_central_differences(
 
 
 def test_only_places_that_the_design_can_change_are_constrained(
-    lattice: Lattice, space: DesignSpace, constraints: ConstraintVector
+    lattice: structure.Lattice, space: structure.DesignSpace, constraints: ConstraintVector
 ) -> None:
     _, jacobian = constraints(random_design(space, 0.5))
     free = np.isin(np.arange(lattice.n_vertices), space.free_vertices)
@@ -89,13 +79,13 @@ def test_only_places_that_the_design_can_change_are_constrained(
     assert (rows[edges] > 0).all()
 
 
-def test_every_corner_is_constrained_even_without_a_ligament(lattice: Lattice) -> None:
-    space = design_space(lattice, np.array([0]))
+def test_every_corner_is_constrained_even_without_a_ligament(lattice: structure.Lattice) -> None:
+    space = structure.design_space(lattice, np.array([0]))
     corners = ConstraintVector(space, Limits(block_angle=0.5)).kinds[0].places
     assert set(range(4)) <= set(corners[:, 1])
 
 
-def block_angles(lattice: Lattice, vertices: Floats) -> Floats:
+def block_angles(lattice: structure.Lattice, vertices: Floats) -> Floats:
     """Interior angle (n_vertices,) of each unit at each vertex, on [0, 2 pi), rad."""
     following, preceding = (
         (vertices[beside] - vertices) @ np.array([1.0, 1.0j])
@@ -105,7 +95,7 @@ def block_angles(lattice: Lattice, vertices: Floats) -> Floats:
 
 
 def test_margins_are_those_of_the_geometry(
-    lattice: Lattice, space: DesignSpace, constraints: ConstraintVector
+    lattice: structure.Lattice, space: structure.DesignSpace, constraints: ConstraintVector
 ) -> None:
     design = random_design(space, 1.0)
     vertices = constraints.vertices(design)
@@ -117,11 +107,15 @@ def test_margins_are_those_of_the_geometry(
     angles = block_angles(lattice, vertices)
     assert found["block_angle"].value == pytest.approx(angles.min() - np.pi / 6)
     assert found["convexity"].value == pytest.approx(np.pi - angles.max())
-    assert found["void_angle"].value == pytest.approx(float(void_angles(lattice, vertices).min()))
-    assert found["gap"].value == pytest.approx(smallest_gap(lattice, vertices).distance - 0.2)
+    assert found["void_angle"].value == pytest.approx(
+        float(structure.void_angles(lattice, vertices).min())
+    )
+    assert found["gap"].value == pytest.approx(
+        structure.smallest_gap(lattice, vertices).distance - 0.2
+    )
 
 
-def test_the_worst_unit_is_named(lattice: Lattice) -> None:
+def test_the_worst_unit_is_named(lattice: structure.Lattice) -> None:
     vertices = lattice.vertices.copy()
     unit = 3 + 5 * 2
     vertices[4 * unit] = vertices[4 * unit + 1] + [0.5, -0.5]
@@ -141,10 +135,10 @@ def test_void_angles_unwrap_from_minus_45_to_315_degrees(degrees: float) -> None
 
 
 def test_block_and_void_angles_close_the_circle_for_any_design(
-    lattice: Lattice, space: DesignSpace, constraints: ConstraintVector
+    lattice: structure.Lattice, space: structure.DesignSpace, constraints: ConstraintVector
 ) -> None:
     vertices = constraints.vertices(random_design(space, 2.0))
-    around = void_angles(lattice, vertices).sum(axis=1)
+    around = structure.void_angles(lattice, vertices).sum(axis=1)
     blocks = block_angles(lattice, vertices)[lattice.ligaments].sum(axis=1)
     np.testing.assert_allclose(around + blocks, 2 * np.pi, atol=1e-12)
 
@@ -152,8 +146,8 @@ def test_block_and_void_angles_close_the_circle_for_any_design(
 @pytest.mark.parametrize("gap", [None, 0.2])
 def test_only_the_gap_keeps_diagonal_neighbours_apart(gap: float | None) -> None:
     """Two units pushed at one another across a void, all angles and lengths being respected."""
-    lattice = quads(4, 4, 15.0, 2.25, np.deg2rad(20))
-    space = design_space(lattice, np.array([5, 6, 9, 10]))
+    lattice = structure.quads(4, 4, 15.0, 2.25, np.deg2rad(20))
+    space = structure.design_space(lattice, np.array([5, 6, 9, 10]))
     limits = Limits(edge_length=3.0, block_angle=np.pi / 6, convex=True, void_angle=0.0, gap=gap)
     constraints = ConstraintVector(space, limits)
     rings = np.stack([np.arange(20, 24), np.arange(40, 44)])
@@ -168,13 +162,13 @@ def test_only_the_gap_keeps_diagonal_neighbours_apart(gap: float | None) -> None
     vertices = constraints.vertices(found.x)
     assert found.violation == 0.0
     assert min(margin.value for margin in margins(lattice, vertices, limits).values()) >= 0
-    overlapping = overlapping_pairs(lattice, vertices).tolist()
+    overlapping = structure.overlapping_pairs(lattice, vertices).tolist()
     if gap is None:
         assert [5, 10] in overlapping
         assert margins(lattice, vertices, LIMITS)["gap"].value < -0.2
     else:
         assert overlapping == []
-        assert smallest_gap(lattice, vertices).distance == pytest.approx(gap, abs=1e-2)
+        assert structure.smallest_gap(lattice, vertices).distance == pytest.approx(gap, abs=1e-2)
 
 
 def convex_ring(seed: int, centre: tuple[float, float]) -> np.ndarray:
@@ -212,7 +206,7 @@ def test_separation_ignores_padding() -> None:
     assert np.isfinite(jax.grad(separation)(jnp.asarray(padded))).all()
 
 
-def test_no_requirement_means_no_constraint(space: DesignSpace) -> None:
+def test_no_requirement_means_no_constraint(space: structure.DesignSpace) -> None:
     values, jacobian = ConstraintVector(space, Limits())(np.zeros(space.n_variables))
     assert values.shape == (0,)
     assert jacobian.shape == (0, space.n_variables)

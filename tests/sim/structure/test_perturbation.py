@@ -2,30 +2,21 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.structure import (
-    Material,
-    Perturbation,
-    PerturbedStructure,
-    VoidAngleContact,
-    overlapping_pairs,
-    perturbed,
-    quads,
-    void_angles,
-)
+from sim import structure
 from sim.structure.gaps import polygons
 from sim.structure.perturbation import clashing_units
 
-LATTICE = quads(5, 4, 15.0, 2.25, np.deg2rad(20.0))
+LATTICE = structure.quads(5, 4, 15.0, 2.25, np.deg2rad(20.0))
 CUTOFF = np.deg2rad(-10.0)
-CONTACT = VoidAngleContact(np.deg2rad(-15.0), CUTOFF)
-PLAIN = Material(1.0, 120.0, 1.19, 1.5, 1.5, 0.1, 0.2)
+CONTACT = structure.VoidAngleContact(np.deg2rad(-15.0), CUTOFF)
+PLAIN = structure.Material(1.0, 120.0, 1.19, 1.5, 1.5, 0.1, 0.2)
 
 
 def drawn(
     seed: int, vertices: np.ndarray = LATTICE.vertices, **sizes: float | tuple[float, float]
-) -> PerturbedStructure:
-    given = Perturbation(**sizes)  # type: ignore[arg-type]
-    return perturbed(LATTICE, vertices, PLAIN, given, CONTACT, (seed,))
+) -> structure.PerturbedStructure:
+    given = structure.Perturbation(**sizes)  # type: ignore[arg-type]
+    return structure.perturbed(LATTICE, vertices, PLAIN, given, CONTACT, (seed,))
 
 
 def draw(largest: float, seed: int = 0) -> np.ndarray:
@@ -55,8 +46,8 @@ def test_what_clashes_is_drawn_again_and_counted() -> None:
     for copy in found:
         assert copy.sound
         assert (copy.redrawn > 0) == (copy.clashes > 0)
-        assert len(overlapping_pairs(LATTICE, copy.vertices)) == 0
-        assert np.asarray(void_angles(LATTICE, copy.vertices)).min() > CUTOFF
+        assert len(structure.overlapping_pairs(LATTICE, copy.vertices)) == 0
+        assert np.asarray(structure.void_angles(LATTICE, copy.vertices)).min() > CUTOFF
         rings = copy.vertices.reshape(-1, 4, 2)
         assert all(shapely.Polygon(ring).is_valid for ring in rings)
 

@@ -10,15 +10,7 @@ from sim.solvers import Harmonic, TimeSeries, solve_case
 from sim.time_integration import BLANES_MOAN, LEAPFROG, ExplicitSolver, ImplicitSolver, Splitting
 from sim.vibration import highest_frequency, lowest_frequency
 from tests.sim.structures import Rig, mixed_polygons, rotating_squares
-from tests.sim.time_integration.pulse import (
-    CORNERS,
-    DURATION,
-    MIDDLE,
-    exact_end,
-    order,
-    pulsed,
-    shaken,
-)
+from tests.sim.time_integration import pulse
 
 SPLITTINGS = pytest.mark.parametrize(
     "splitting", [LEAPFROG, BLANES_MOAN], ids=["leapfrog", "Blanes-Moan"]
@@ -42,20 +34,20 @@ def test_coefficients_are_symmetric_and_consistent(splitting: Splitting) -> None
     ("splitting", "steps"), [(LEAPFROG, (800, 1600)), (BLANES_MOAN, (100, 200))]
 )
 def test_order_of_convergence(splitting: Splitting, steps: tuple[int, int]) -> None:
-    rig = pulsed()
+    rig = pulse.pulsed()
 
     def end(n_steps: int) -> Floats:
-        asked = np.array([DURATION])
-        solver = ExplicitSolver(rig.topology, DURATION, n_steps, asked, splitting=splitting)
+        asked = np.array([pulse.DURATION])
+        solver = ExplicitSolver(rig.topology, pulse.DURATION, n_steps, asked, splitting=splitting)
         u, _, record = solver.forward(rig.values, rig.drive)
         assert record.steps.n_steps == n_steps
         return u[-1]
 
-    assert order(end, steps, exact_end(rig)) == pytest.approx(splitting.order, abs=0.1)
+    assert pulse.order(end, steps, pulse.exact_end(rig)) == pytest.approx(splitting.order, abs=0.1)
 
 
 def test_both_integrators_agree() -> None:
-    rig = shaken(1.0)
+    rig = pulse.shaken(1.0)
     times = np.linspace(0.0, 0.012, 1201)
     asked = times[::100]
     implicit = ImplicitSolver(rig.topology, times, asked, tolerance=1e-6)
@@ -71,7 +63,7 @@ def test_energy_is_kept_without_damping(splitting: Splitting) -> None:
     rest = np.zeros((3, 3))
     rest[1:] = [1.0, 0.5, 0.05]
     series = TimeSeries(np.array([0.0, 0.001, 0.02]), rest)
-    rig = Rig(rotating_squares(), CORNERS, MIDDLE, series)
+    rig = Rig(rotating_squares(), pulse.CORNERS, pulse.MIDDLE, series)
     values = rig.values._replace(damping=np.zeros_like(rig.values.damping))
     asked = np.linspace(0.0015, 0.02, 60)
     u, v, _ = ExplicitSolver(rig.topology, 0.02, 2000, asked, splitting=splitting).forward(
@@ -88,7 +80,7 @@ def test_energy_is_kept_without_damping(splitting: Splitting) -> None:
 
 
 def test_a_step_beyond_the_stability_limit_is_cut() -> None:
-    rig = shaken(1.0)
+    rig = pulse.shaken(1.0)
     limit = 0.012 * highest_frequency(rig.topology, rig.values) / BLANES_MOAN.stability
     coarse = solver_for(rig, int(0.6 * limit))
     u, _, record = coarse.forward(rig.values, rig.drive)
@@ -101,7 +93,7 @@ def test_a_step_beyond_the_stability_limit_is_cut() -> None:
 
 @SPLITTINGS
 def test_every_state_stays_inside_the_barrier(splitting: Splitting) -> None:
-    rig = shaken(2.5, bias_deg=45.0)
+    rig = pulse.shaken(2.5, bias_deg=45.0)
     u, _, record = solver_for(rig, 600, splitting).forward(rig.values, rig.drive)
     states = u.reshape(len(u), -1, 3)
     angles = rig.topology.smallest_void_angles(rig.values.void, states)
@@ -111,7 +103,7 @@ def test_every_state_stays_inside_the_barrier(splitting: Splitting) -> None:
 
 
 def test_deep_contact_takes_no_shorter_steps() -> None:
-    rig = shaken(3.0, bias_deg=45.0)
+    rig = pulse.shaken(3.0, bias_deg=45.0)
     rough = solver_for(rig, 300)
     u, _, record = rough.forward(rig.values, rig.drive)
     assert record.steps.n_steps == rough.n_steps
@@ -124,7 +116,7 @@ def test_deep_contact_takes_no_shorter_steps() -> None:
 
 
 def test_a_run_that_would_fill_the_memory_is_refused_before_it_begins() -> None:
-    rig = shaken(1.0)
+    rig = pulse.shaken(1.0)
     stiff = rig.values._replace(law=rig.values.law * 1e14)
     with pytest.raises(SimulationError, match=r"explicit run needs \d+ steps .* try softer"):
         solver_for(rig, 200).forward(stiff, rig.drive)

@@ -10,15 +10,7 @@ from sim.solvers import LinearRamp, TimeSeries, solve_case
 from sim.time_integration import ImplicitSolver
 from sim.time_integration.coefficients import ESDIRK3
 from tests.sim.structures import NONE, Rig, rotating_squares
-from tests.sim.time_integration.pulse import (
-    CORNERS,
-    DURATION,
-    MIDDLE,
-    exact_end,
-    order,
-    pulsed,
-    shaken,
-)
+from tests.sim.time_integration import pulse
 
 
 def test_order_conditions_of_the_method() -> None:
@@ -40,16 +32,16 @@ def test_the_method_damps_what_it_cannot_resolve() -> None:
 
 
 def test_order_of_convergence() -> None:
-    rig = pulsed()
+    rig = pulse.pulsed()
 
     def end(n_steps: int) -> Floats:
-        times = np.linspace(0.0, DURATION, n_steps + 1)
+        times = np.linspace(0.0, pulse.DURATION, n_steps + 1)
         solver = ImplicitSolver(rig.topology, times, times[-1:], tolerance=1e-7)
         u, _, record = solver.forward(rig.values, rig.drive)
         assert len(record.times) == len(times)
         return u[-1]
 
-    assert order(end, (160, 320), exact_end(rig)) == pytest.approx(3.0, abs=0.1)
+    assert pulse.order(end, (160, 320), pulse.exact_end(rig)) == pytest.approx(3.0, abs=0.1)
 
 
 def solver_for(rig: Rig, n_steps: int = 60) -> ImplicitSolver:
@@ -58,7 +50,7 @@ def solver_for(rig: Rig, n_steps: int = 60) -> ImplicitSolver:
 
 
 def test_every_stage_stays_inside_the_barrier() -> None:
-    rig = shaken(2.5, bias_deg=45.0)
+    rig = pulse.shaken(2.5, bias_deg=45.0)
     record = solver_for(rig).forward(rig.values, rig.drive)[2]
     stages = record.u[:-1].reshape(-1, rig.lattice.n_units, 3)
     angles = rig.topology.smallest_void_angles(rig.values.void, stages)
@@ -66,7 +58,7 @@ def test_every_stage_stays_inside_the_barrier() -> None:
 
 
 def test_a_grid_that_is_too_coarse_is_split_where_it_fails() -> None:
-    rig = shaken(3.0, bias_deg=40.0)
+    rig = pulse.shaken(3.0, bias_deg=40.0)
     coarse = solver_for(rig, n_steps=12)
     u, _, record = coarse.forward(rig.values, rig.drive)
     assert len(record.times) > len(coarse.times)
@@ -82,7 +74,7 @@ def test_a_grid_that_is_too_coarse_is_split_where_it_fails() -> None:
 
 
 def test_stiff_ligaments_shorten_all_steps_to_come() -> None:
-    rig = shaken(0.5)
+    rig = pulse.shaken(0.5)
     law = rig.values.law.copy()
     law[..., 0] *= 1e3
     stiff = rig.values._replace(law=law)
@@ -118,7 +110,7 @@ def test_turning_around_several_times() -> None:
 
 
 def test_asked_times_do_not_change_the_steps() -> None:
-    rig = shaken(1.0)
+    rig = pulse.shaken(1.0)
     solver = solver_for(rig)
     between = replace(solver, output_times=solver.times[3::7])
     one, other = (s.forward(rig.values, rig.drive) for s in (solver, between))
@@ -132,13 +124,13 @@ def test_a_rough_recorded_drive_needs_few_cuts() -> None:
     knots = np.linspace(0.0, 0.012, 25)
     noise = np.random.default_rng(5).normal(size=(25, 3)) * [0.5, 0.5, 0.03]
     series = TimeSeries(knots, np.sin(np.pi * knots / 0.012)[:, None] * noise)
-    rig = Rig(rotating_squares(), CORNERS, MIDDLE, series)
+    rig = Rig(rotating_squares(), pulse.CORNERS, pulse.MIDDLE, series)
     record = solver_for(rig).forward(rig.values, rig.drive)[2]
     assert len(record.times) < 75
 
 
 def test_halving_for_the_error_estimate() -> None:
-    rig = shaken(1.0)
+    rig = pulse.shaken(1.0)
     solver = solver_for(rig)
     record = solver.forward(rig.values, rig.drive)[2]
     np.testing.assert_allclose(solver.refined(record).times, np.linspace(0.0, 0.012, 121))
