@@ -5,7 +5,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from pipeline.calibration.inputs import RecordOptions
 from sim.core import Floats
@@ -95,6 +94,8 @@ def loop_areas(branches: Sequence[LoadBranch]) -> Floats:
 
 def find_snaps(branch: LoadBranch) -> list[Snap]:
     """Finds where the force's magnitude falls off suddenly, in the direction of the branch."""
+    from scipy.signal import find_peaks
+
     turn = slice(None) if branch.loading else slice(None, None, -1)
     way, force = branch.displacement[turn], branch.force[turn]
     height = PROMINENT * float(np.ptp(force))

@@ -7,8 +7,6 @@ from pathlib import Path
 import pytest
 import requests
 import rocrate
-from rocrate_validator import models, services
-from rocrate_validator.utils.http import HttpRequester
 
 from pipeline import datasets
 from pipeline.datasets import provenance
@@ -20,7 +18,7 @@ from tests.pipeline.samples import sample
 _CONTEXT = Path(rocrate.__file__).parent / "data/ro-crate.jsonld"
 
 
-def _held(_self: HttpRequester, url: str, **_: object) -> requests.Response:
+def _held(_self: object, url: str, **_: object) -> requests.Response:
     """Answers with the context that rocrate holds; its terms of Bioschemas were shorter in 1.1."""
     answer = requests.Response()
     answer.url, answer.status_code = url, 404
@@ -48,6 +46,9 @@ def crate(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_it_holds_to_the_profile(crate: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rocrate_validator import models, services
+    from rocrate_validator.utils.http import HttpRequester
+
     for method in ("get", "head"):
         monkeypatch.setattr(HttpRequester, method, _held, raising=False)
     settings = services.ValidationSettings(
