@@ -134,7 +134,7 @@ def template_weight(
         return np.asarray(_smooth(inside, outside, outside + pixel), np.float32)
     weight = _smooth(inside, -outside - pixel, -outside)
     beyond = _smooth(-inside, -0.5 * blur, 0.5 * blur)
-    weight *= 1 - beyond * (1 - _smooth(joint, 3 * pixel, 4 * pixel))
+    weight *= 1 - beyond * (1 - _smooth(joint, 1.5 * pixel, 2.5 * pixel))
     if kind == "bare":
         weight *= 1 - _smooth(inside, outside, outside + pixel)
     return np.asarray(weight, np.float32)

@@ -23,7 +23,7 @@ _FILLINGS, _FILLED = 80, 0.1
 """Rounds in which missing motions are filled, at most; a change, over the noise, of no use."""
 _REACHES = (1, 2, 3, 4, 5, 6)
 """Frames to either side of one whose place the polynomial through them tells."""
-_TELLING = 3
+_TELLING = 4
 """Fewest frames that tell how much a polynomial of higher order leaves."""
 _LITTLE_MORE = 1.3
 _JOLT = 3.0

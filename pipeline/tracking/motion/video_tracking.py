@@ -127,7 +127,9 @@ def track_video(
         late = row_times(motion, specimen, calibration, setup)
         bend = exposure**2 / 24 * shares[..., _OF_DOF]
         motion, sigmas, missed = at_frame_times(motion, sigmas, time, late, bend, shown.averaged)
-        unsure = missed[..., :2].max(axis=-1) > (_UNSURE * calibration.pixel) ** 2
+        off = np.sqrt(missed[..., :2].max(axis=-1)) / calibration.pixel
+        usual = np.median(off, axis=1, keepdims=True)  # one unit alone has met with noise
+        unsure = (off > _UNSURE) & (usual > _UNSURE / 5)
         if unsure.any():
             motion[unsure], qualities[unsure] = np.nan, POOR_FIT
             LOG.warning(
