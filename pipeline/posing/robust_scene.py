@@ -3,14 +3,14 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.posing.to_scene import motions_of, scene_of
 from pipeline.problem import Problem
-from pipeline.problem.sections import HarmonicDrive, Load, RampHarmonicDrive, Robust
+from pipeline.problem.sections import HarmonicDrive, Load, RampHarmonicDrive
 from sim.load_family import LoadFamily
 from sim.scene import DIRECTED, Scene
 from sim.solvers import MotionLaw
+from sim.structure import Perturbation, draw_copies
 
 
 def design_scene(asked: Problem, folder: Path) -> Scene:
@@ -24,8 +24,11 @@ def design_scene(asked: Problem, folder: Path) -> Scene:
         scene = scene.updated(reaction=asked.objective.reaction)
     if robust is None:
         return scene
-    copies = _copies(robust, scene) if robust.copies else None
-    scene = scene.updated(sharpness=robust.sharpness, copies=copies)
+    if robust.copies:
+        sizes = Perturbation(robust.geometry * scene.lattice.spacing, robust.stiffness)
+        copies = draw_copies(scene.lattice, sizes, robust.copies, robust.seed)
+        scene = scene.updated(copies=copies, copy_sharpness=robust.copy_sharpness)
+    scene = scene.updated(sharpness=robust.sharpness)
     if not robust.loads:
         return scene
     loads = (Load(), *robust.loads)
@@ -62,10 +65,3 @@ def _under(asked: Problem, load: Load) -> Problem:
     assert isinstance(asked.drive, HarmonicDrive | RampHarmonicDrive)
     changed = load.model_dump(include={"amplitude", "frequency"}, exclude_none=True)
     return asked.model_copy(update={"drive": asked.drive.model_copy(update=changed)})
-
-
-def _copies(robust: Robust, scene: Scene) -> NDArray[np.float64]:
-    """Draws shifts (n_copies, n_groups, 2) of the vertices, evenly spread, mm."""
-    largest = robust.geometry * scene.lattice.spacing
-    random = np.random.default_rng(robust.seed)
-    return random.uniform(-largest, largest, (robust.copies, scene.lattice.n_groups, 2))

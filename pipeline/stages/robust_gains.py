@@ -14,7 +14,7 @@ from pipeline.datasets import provenance
 from pipeline.posing import design_scene, loss_units, read_design, structures_of
 from pipeline.problem import Problem
 from pipeline.runtime import UserError, cli
-from sim.scene import Scene, make_plan, simulate
+from sim.scene import Scene, combined, make_plan, simulate
 
 PLAIN = "plain"
 HELD_OUT = 16
@@ -115,8 +115,18 @@ def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
     vertices = scene.lattice.vertices
     if path is not None:
         scene, vertices = structures_of(scene, read_design(asked, path))["cloaked"]
-    shifts = [0.0] if scene.design.copies is None else scene.design.copies[:, scene.lattice.group]
-    return float(np.mean([_of(scene, vertices + shift) for shift in shifts]))
+    copies = scene.design.copies
+    if copies is None:
+        return _of(scene, vertices)
+    losses = [
+        _of(
+            scene.updated(material=scene.structure.material.scaled(stiffness)),
+            vertices + shifts[scene.lattice.group],
+        )
+        for shifts, stiffness in zip(copies.shifts, copies.stiffness, strict=True)
+    ]
+    weights = np.full(len(losses), 1.0 / len(losses))
+    return float(combined(np.array(losses), weights, scene.objective.copy_sharpness))
 
 
 def _of(scene: Scene, vertices: NDArray[np.float64]) -> float:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import jax
 import jax.numpy as jnp
@@ -18,7 +18,11 @@ from sim.optimise import Evaluation, Journal, MmaOptions, Result, SqpOptions
 from sim.optimise import minimise as minimise_loss
 from sim.quasistatics import StaticRecord, StaticSolver
 from sim.scene.objectives import combined
-from sim.scene.parameter_map import ParameterMap, parameters_of_design
+from sim.scene.parameter_map import (
+    ParameterMap,
+    parameters_of_copies,
+    parameters_of_design,
+)
 from sim.scene.path_constraints import PathConstraints, check_unsnapped
 from sim.scene.plan import Plan, make_plan, sample_times
 from sim.scene.scene import Scene
@@ -63,8 +67,14 @@ class GradientChain:
         designed: bool = False,
     ) -> None:
         self._designed = designed
-        self._of_design = of_design
+        self.of_design = of_design
         self._measured = jax.jit(jax.value_and_grad(measure, argnums=(0, 1), has_aux=True))
+
+    def mapped(self, of_design: ParameterMap) -> Self:
+        """Returns the chain behind another map, its measure compiled no second time."""
+        other = copy(self)
+        other.of_design = of_design
+        return other
 
     def __call__(
         self,
@@ -79,7 +89,7 @@ class GradientChain:
         Raises:
             SimulationError: a step failed, or an equilibrium is not stable.
         """
-        made = self._of_design(design)
+        made = self.of_design(design)
         solver = solver if self._designed else everywhere(solver)
         motion, velocity, records = solve_cases(
             solver, concrete(made), cases, _started(solver, memory)
@@ -90,7 +100,7 @@ class GradientChain:
         still = np.zeros_like(velocity)
         through = adjoint_cases(solver, records, np.asarray(bar_motion), still).parameters
         bar = Parameters(*(one + two for one, two in zip(direct, through, strict=True)))
-        return float(value), self._of_design.pull_back(design, bar), np.asarray(more)
+        return float(value), self.of_design.pull_back(design, bar), np.asarray(more)
 
 
 def _started(solver: Solver, memory: Memory | None) -> list[Solver] | None:
@@ -106,8 +116,7 @@ class Evaluator:
     Args:
         scene: the scene.
         plan: of `make_plan`; by default one from the initial structure.
-        memory: of equilibrium paths, that those of a static scene start from; unused where
-            imperfect copies are simulated.
+        memory: of equilibrium paths, that those of a static scene start from.
         at: where in the plan's output the samples of the loss are, if there are others.
 
     Raises:
@@ -124,7 +133,7 @@ class Evaluator:
         self.scene, self.plan = scene, plan or make_plan(scene)
         if scene.space.n_variables == 0:
             raise ValueError("the design of the scene has no cloak that could change")
-        simulated, copies = self.plan.simulated, scene.design.copies
+        simulated = self.plan.simulated
         place = np.searchsorted(simulated, self.plan.case_of)
         weights, measure = jnp.asarray(scene.loads.case_weights), mimicking(scene)
 
@@ -133,11 +142,9 @@ class Evaluator:
             return combined(each, weights, scene.objective.sharpness), each
 
         self._cases = tuple(scene.loads.cases[case] for case in simulated)
-        self._memory = memory if copies is None else None
-        numbers = [None] if copies is None else range(len(copies))
-        self._chains = [
-            GradientChain(parameters_of_design(scene, k), mean, designed=True) for k in numbers
-        ]
+        self._memory = memory
+        chain = GradientChain(parameters_of_design(scene), mean, designed=True)
+        self._chains = [chain.mapped(each) for each in parameters_of_copies(scene)]
 
     def __call__(self, design: Floats) -> tuple[float, Floats, Floats]:
         """Loss, gradient (n_variables,) in 1/mm and losses (n_cases,) of a design vector, mm.
@@ -145,15 +152,47 @@ class Evaluator:
         Raises:
             SimulationError: the simulation fails.
         """
-        solver = self.plan.solver
-        found = [
-            chain(design, solver=solver, cases=self._cases, memory=self._memory)
-            for chain in self._chains
-        ]
+        solver, cases = self.plan.solver, self._cases
         if self.scene.design.copies is None:
-            return found[0]
-        value, gradient, each = (np.mean(part, axis=0) for part in zip(*found, strict=True))
-        return float(value), gradient, each
+            return self._chains[0](design, solver=solver, cases=cases, memory=self._memory)
+        memory = None if self._memory is None else _PartedMemory(self._memory, len(cases))
+        found = [chain(design, solver=solver, cases=cases, memory=memory) for chain in self._chains]
+        if memory is not None:
+            memory.close(design)
+        values, gradients, each = (np.array(part) for part in zip(*found, strict=True))
+        # (sum v^p / n)^(1/p) of the copies' losses v, and its derivatives (v / value)^(p - 1) / n
+        sharpness = self.scene.objective.copy_sharpness
+        value = float(combined(values, np.full(len(values), 1 / len(values)), sharpness))
+        shares = (values / value) ** (sharpness - 1.0) / len(values)
+        return value, shares @ gradients, each.mean(axis=0)
+
+
+class _PartedMemory:
+    """Remembers the paths of all copies of a design together (``Memory``), a copy after the other.
+
+    Args:
+        whole: of the paths of all copies.
+        n_cases: of a copy.
+    """
+
+    def __init__(self, whole: Memory, n_cases: int) -> None:
+        self._whole, self._n_cases = whole, n_cases
+        self._before, self._after = whole.start(), list[StaticRecord]()
+
+    def start(self) -> Sequence[StaticRecord] | None:
+        """See ``Memory``."""
+        first = len(self._after)
+        return self._before and self._before[first : first + self._n_cases]
+
+    def keep(self, design: Floats, records: Sequence[StaticRecord]) -> None:
+        """See ``Memory``."""
+        del design
+        self._after += records
+
+    def close(self, design: Floats) -> None:
+        """Hands the records on, if there are any: motions in time have none."""
+        if self._after:
+            self._whole.keep(design, self._after)
 
 
 _evaluator = lru_cache(maxsize=4)(Evaluator)

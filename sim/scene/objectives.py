@@ -90,10 +90,10 @@ class ReactionMimicking(NamedTuple):
         return total.reshape(*ends.shape[:2], 2)
 
 
-def combined(losses: Array, weights: Numbers, sharpness: float) -> Array:
+def combined(losses: Numbers, weights: Numbers, sharpness: float) -> Array:
     """Takes the weighted p-mean of losses (n_cases,): their mean for 1, the largest for large p."""
     if sharpness == 1.0:
-        return jnp.asarray(weights) @ losses
+        return jnp.asarray(weights) @ jnp.asarray(losses)
     largest = jax.lax.stop_gradient(jnp.max(losses))
     return largest * (jnp.asarray(weights) @ (losses / largest) ** sharpness) ** (1.0 / sharpness)
 

@@ -1,8 +1,9 @@
 """Maps designs to the parameters of their structures, and derivatives back."""
 
 from collections.abc import Callable
+from copy import copy
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, Self
 
 import jax
 import jax.numpy as jnp
@@ -18,19 +19,30 @@ from sim.structure import ConcreteParameters, Parameters, parameters, shape
 
 
 class ParameterMap:
-    """Compiles a differentiable map (JAX) from designs to parameters, and its pull-back."""
+    """Compiles a differentiable map (JAX) from designs to parameters, and its pull-back.
 
-    def __init__(self, of_design: Callable[[Array], Parameters[Array]]) -> None:
-        self._of_design = jax.jit(of_design)
-        self._pull_back = jax.jit(lambda design, bar: jax.vjp(of_design, design)[1](bar)[0])
+    What is ``passed`` stands behind the design vector.
+    """
+
+    def __init__(self, of_design: Callable[..., Parameters[Array]], *passed: Floats) -> None:
+        self._of_design, self._passed = jax.jit(of_design), passed
+        self._pull_back = jax.jit(
+            lambda design, bar, *passed: jax.vjp(lambda x: of_design(x, *passed), design)[1](bar)[0]
+        )
+
+    def passing(self, *passed: Floats) -> Self:
+        """Returns the map that passes something else, compiled no second time."""
+        other = copy(self)
+        other._passed = passed
+        return other
 
     def __call__(self, design: Numbers) -> Parameters[Array]:
         """Parameters of a design vector (n_variables,); differentiable by it."""
-        return self._of_design(design)
+        return self._of_design(design, *self._passed)
 
     def pull_back(self, design: Floats, bar: Parameters[Any]) -> Floats:
         """Pulls derivatives by the parameters back to those (n_variables,) by the design vector."""
-        return np.asarray(self._pull_back(design, bar))
+        return np.asarray(self._pull_back(design, bar, *self._passed))
 
 
 def rest_motion(scene: Scene, values: Parameters[Any]) -> Array:
@@ -53,8 +65,10 @@ class RestingMap(ParameterMap):
     turn the units.
     """
 
-    def __init__(self, scene: Scene, of_design: Callable[[Array], Parameters[Array]]) -> None:
-        super().__init__(of_design)
+    def __init__(
+        self, scene: Scene, of_design: Callable[..., Parameters[Array]], *passed: Floats
+    ) -> None:
+        super().__init__(of_design, *passed)
         self._scene = scene
         self._from_rest = jax.jit(partial(counted_from_rest, scene.lattice))
 
@@ -73,26 +87,29 @@ class RestingMap(ParameterMap):
 
 
 @lru_cache(maxsize=16)
-def parameters_of_design(scene: Scene, copy: int | None = None) -> ParameterMap:
-    """Compiles the map from a design vector to the parameters of its structure.
+def parameters_of_design(scene: Scene) -> ParameterMap:
+    """Compiles the map from a design vector to the parameters of its structure."""
+    lattice, space, material = scene.lattice, scene.space, scene.structure.material
 
-    With a ``copy``, to those of that one of the design's imperfect copies.
-    """
-    copies, space = scene.design.copies, scene.space
-    of_group = (
-        np.zeros((scene.lattice.n_groups, 2)) if copies is None or copy is None else copies[copy]
-    )
-    off = jnp.asarray(of_group)[scene.lattice.group]
-    material = scene.structure.material
-
-    def of_design(design: Array) -> Parameters[Array]:
-        made, built = shape(scene.lattice, space.vertices(design) + off), material
+    def of_design(design: Array, shifts: Array, stiffness: Array) -> Parameters[Array]:
+        made, built = shape(lattice, space.vertices(design) + shifts[lattice.group]), material
         if space.turning:
             angles = material.end_angles + space.end_angles(design)
             built = material._replace(end_angles=angles)
-        return parameters(scene.lattice, made, built)
+        return parameters(lattice, made, built.scaled(stiffness))
 
-    return RestingMap(scene, of_design) if space.turning else ParameterMap(of_design)
+    as_designed = np.zeros((lattice.n_groups, 2)), np.ones((3, lattice.n_ligaments))
+    if space.turning:
+        return RestingMap(scene, of_design, *as_designed)
+    return ParameterMap(of_design, *as_designed)
+
+
+def parameters_of_copies(scene: Scene) -> list[ParameterMap]:
+    """Lists the maps to the parameters of a design's imperfect copies, or of itself alone."""
+    of_design, copies = parameters_of_design(scene), scene.design.copies
+    if copies is None:
+        return [of_design]
+    return [of_design.passing(*each) for each in zip(copies.shifts, copies.stiffness, strict=True)]
 
 
 def concrete_parameters(scene: Scene, vertices: Floats) -> ConcreteParameters:

@@ -22,6 +22,7 @@ from sim.solvers import (
 )
 from sim.structure import (
     ContactModel,
+    Copies,
     DesignSpace,
     FoilLimit,
     Lattice,
@@ -170,6 +171,7 @@ class Objective:
         reaction: weight of the relative error of the drive's force, where a reference is mimicked.
         sharpness: p of the weighted p-mean of the cases' losses that is minimised: 1 is their mean,
             a large one a smooth maximum.
+        copy_sharpness: the same of the losses of the design's imperfect copies.
         snap_margin: smallest eigenvalue of the tangent that a design must keep at all loads of a
             static scene, over that of the initial structure at rest; None where it may snap.
         foil: largest strain of the foil of its ligaments that a design must keep to at all times;
@@ -183,6 +185,7 @@ class Objective:
     reference: Scene | None = None
     reaction: float = 0.0
     sharpness: float = 1.0
+    copy_sharpness: float = 1.0
     snap_margin: float | None = None
     foil: FoilLimit | None = None
 
@@ -197,15 +200,14 @@ class Design:
         symmetry: imposed on the design.
         turning_slots: whether the slots that hold the ligaments turn as well: shims are then bent
             before any load, and all motion is counted from where the structure rests.
-        copies: (n_copies, n_groups, 2) shifts of imperfect copies over which the loss is averaged,
-            mm; None for the structure alone.
+        copies: imperfect ones, whose losses count; None for the structure alone.
     """
 
     cloak: Ints = field(default_factory=_none)
     frozen: Ints | None = None
     symmetry: Symmetry = "none"
     turning_slots: bool = False
-    copies: Floats | None = None
+    copies: Copies | None = None
 
 
 @dataclass(frozen=True)

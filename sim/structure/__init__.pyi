@@ -33,6 +33,8 @@ from .parametrisation import ConcreteParameters as ConcreteParameters
 from .parametrisation import Parameters as Parameters
 from .parametrisation import parameters as parameters
 from .perturbation import MOST_ROUNDS as MOST_ROUNDS
+from .perturbation import Copies as Copies
 from .perturbation import Perturbation as Perturbation
 from .perturbation import PerturbedStructure as PerturbedStructure
+from .perturbation import draw_copies as draw_copies
 from .perturbation import perturbed as perturbed

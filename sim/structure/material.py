@@ -34,6 +34,14 @@ class Material(NamedTuple):
     end_angles: float | Numbers = 0.0
     elongation: float | Numbers = 0.0
 
+    def scaled(self, factors: Numbers) -> Material:
+        """Multiplies the axial, shear and bending stiffnesses by factors (3, n_ligaments)."""
+        return self._replace(
+            axial_stiffness=self.axial_stiffness * factors[0],
+            shear_stiffness=self.shear_stiffness * factors[1],
+            bending_stiffness=self.bending_stiffness * factors[2],
+        )
+
 
 def unrotated_inertia(density: float, spacing: float) -> tuple[float, float]:
     """Returns mass (tonne) and inertia (tonne mm^2) of the authors' unrotated square.

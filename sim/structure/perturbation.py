@@ -46,6 +46,31 @@ class PerturbedStructure:
     sound: bool = True  # whether no unit overlaps or touches another at rest
 
 
+@dataclass(frozen=True, eq=False)
+class Copies:
+    """Holds the deviations of copies of whatever structure; they may overlap.
+
+    Attributes:
+        shifts: (n_copies, n_groups, 2) of the vertices, mm.
+        stiffness: (n_copies, 3, n_ligaments) factors of the axial, shear and bending stiffnesses.
+    """
+
+    shifts: Floats
+    stiffness: Floats
+
+    def __len__(self) -> int:
+        """Counts the copies."""
+        return len(self.shifts)
+
+
+def draw_copies(lattice: Lattice, sizes: Perturbation, count: int, seed: int) -> Copies:
+    """Draws vertices and stiffnesses of copies that an optimisation keeps while designs change."""
+    random, reach = np.random.default_rng(seed), sizes.geometry or 0.0
+    shifts = random.uniform(-reach, reach, (count, lattice.n_groups, 2))
+    own = _factors((count, 3, lattice.n_ligaments), sizes.ligaments, random)
+    return Copies(shifts, own * _factors((count, 3, 1), sizes.stiffness, random))
+
+
 def perturbed(
     lattice: Lattice,
     vertices: Floats,
@@ -77,10 +102,7 @@ def _varied(
     common = _factors((3, 1), sizes.stiffness, random)
     damping = _factors((lattice.n_units,), sizes.units, random)
     damping = damping * _factors((1,), sizes.damping, random)
-    return material._replace(
-        axial_stiffness=material.axial_stiffness * own[0] * common[0],
-        shear_stiffness=material.shear_stiffness * own[1] * common[1],
-        bending_stiffness=material.bending_stiffness * own[2] * common[2],
+    return material.scaled(own * common)._replace(
         damping_translation=material.damping_translation * damping,
         damping_rotation=material.damping_rotation * damping,
     )

@@ -41,13 +41,19 @@ class Robust(Section):
         copies: number of imperfect copies, whose mean loss is minimised in place of the perfect
             structure's; none by default.
         geometry: largest shift of their vertices along x and y, as a share of the spacing.
-        seed: of the shifts.
+        stiffness: standard deviation of each of their ligaments' stiffnesses, as a share of it;
+            none by default.
+        copy_sharpness: p of the p-mean of the copies' losses: 1 is their mean, 8 or more leads to
+            the worst of them.
+        seed: of the shifts and stiffnesses.
     """
 
     loads: tuple[Load, ...] = ()
     sharpness: Annotated[float, Field(ge=1.0, le=64.0)] = 1.0
     copies: Annotated[int, Field(ge=0, le=64, strict=True)] = 0
     geometry: Ratio = 0.03
+    stiffness: Ratio | None = None
+    copy_sharpness: Annotated[float, Field(ge=1.0, le=64.0)] = 1.0
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
 

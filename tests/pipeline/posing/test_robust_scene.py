@@ -30,6 +30,8 @@ ROBUST = """  region: surroundings
     sharpness: 8
     copies: 2
     geometry: 0.02
+    stiffness: 0.1
+    copy_sharpness: 4
 """
 
 
@@ -48,8 +50,10 @@ def test_the_drives_own_cases_come_first(robust: Path) -> None:
     np.testing.assert_allclose(scene.loads.case_weights, np.repeat([0.1, 0.1, 0.05], 4))
     assert scene.loads.drive_frequency == 8.0
     assert scene.design.copies is not None
-    assert scene.design.copies.shape == (2, scene.lattice.n_groups, 2)
-    assert 0.29 < np.abs(scene.design.copies).max() <= 0.3
+    assert scene.design.copies.shifts.shape == (2, scene.lattice.n_groups, 2)
+    assert 0.29 < np.abs(scene.design.copies.shifts).max() <= 0.3
+    assert 0.09 < scene.design.copies.stiffness.std() < 0.11
+    assert scene.objective.copy_sharpness == 4.0
 
 
 def test_a_robust_design_tells_the_losses_of_the_drives_own_cases(
