@@ -23,6 +23,7 @@ from .old_commands import keep_old_commands as keep_old_commands
 from .pixel_loops import Picture as Picture
 from .pixel_loops import compiled as compiled
 from .pixel_loops import inlined as inlined
+from .pixel_loops import uncounted as uncounted
 from .source_closure import source_hash as source_hash
 from .stage_server import delegate as delegate
 from .stage_table import REPORTED as REPORTED

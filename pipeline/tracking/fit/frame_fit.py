@@ -8,7 +8,8 @@ import numpy as np
 
 from pipeline.runtime import Picture
 from pipeline.tracking.fit import patch_correlation
-from pipeline.tracking.fit.normal_equations import SIZE, FramePixels, workspace
+from pipeline.tracking.fit.compared_pixels import SIZE, FramePixels, pixel_lists
+from pipeline.tracking.fit.normal_equations import fit_buffers
 from pipeline.tracking.fit.patch_correlation import FitStart, PoseFits, Templates
 from pipeline.tracking.fit.template import block_places
 from pipeline.tracking.fit.template_cells import TemplateCells
@@ -96,9 +97,10 @@ class PoseFitter:
         begin = FitStart(*(values[part] for values in start))
         across = int(2 * begin.radius[wanted[part]].max()) // SIZE + 3
         looks = _part_of(self.templates, part)
-        room = workspace(across**2)
+        lists = pixel_lists(across**2)
+        room = fit_buffers(len(lists.x), looks.weight[0].size)
         patch_correlation.fit_patches(
-            scene, looks, begin, wanted[part], FULL_STEPS, room, out[part]
+            scene, looks, begin, wanted[part], FULL_STEPS, lists, room, out[part]
         )
 
 

@@ -1,256 +1,176 @@
-"""Gathers the normal equations of one unit against a frame, by blocks of 8 x 8 pixels.
+"""Gathers the normal equations of one unit against a frame.
 
-A block is what a codec quantises at once, so errors are alike within; and what a processor's cache
-holds, so pixels are sampled first and summed after, many at a time.
+Pixels are taken by windows that a processor's cache holds, in loops over arrays that lie at fixed
+distances from each other: only then compilers know that what one loop writes is not what it reads.
+The equations are those of the slopes in the unit's own frame, its brightness, the light and its
+slopes; `transform` makes them those of the unknowns.
 """
 
 import math
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.runtime import inlined
-from pipeline.tracking.fit.template_cells import STEEP
+from pipeline.tracking.fit.compared_pixels import LANES, Indices, PixelLists, TemplateArrays
+from pipeline.tracking.fit.node_mixing import mix_nodes
 from sim.core import Floats, Image, Singles
 
 UNKNOWNS = 7  # ux, uy, theta; gain, offset, slope in x, slope in y
-SIZE = 8
-_MIDDLE = 0.5 * (SIZE - 1)
-_PIXELS = SIZE * SIZE
-_ONE, _TWO, _ROW, _LAST = np.array([1, 2, 3, SIZE - 1], np.uint64)
-"""Indices without a sign, which count from the start alone, cost less."""
-_LANES = 8
-"""Numbers that a processor adds at once, or a multiple."""
-_FEW = [(column + 2 * row) % 4 == 0 for row in range(SIZE) for column in range(SIZE)]
-_COMPARED = np.array([[False] * _PIXELS, _FEW, [True] * _PIXELS], np.uint8)
-"""Selects the pixels that are compared, by the kind of its cell and its place in the block."""
+_WINDOW = 512
+_APART = _WINDOW + 16  # not a power of two, whose multiples share a place in the cache
+_SLOPE_X, _SLOPE_Y, _TURN, _FACE, _ONE, _X, _Y, *_OTHERS = (_APART * k for k in range(18))
+"""Arrays of a window: derivatives in the order of the unknowns, and others."""
+_ACROSS, _ALONG, _MIXED, _MIXED_X, _MIXED_Y, _WEIGHT, _RIGHT, _LOWER, _RESIDUAL, _ROOM, _END = (
+    _OTHERS
+)
+_STRIDE = np.uint64(_APART)
 
 
-Indices: TypeAlias = NDArray[np.int32]
-
-
-class FramePixels(NamedTuple):
-    """Holds a frame, and the places in the specimen's plane of its blocks' pixels.
+class FitBuffers(NamedTuple):
+    """Arrays that a fit is made in; compiled loops allocate none.
 
     Attributes:
-        image: (rows, columns) brightness.
-        blocks: (rows, columns, 3, 2) place of a block's middle, change by column and by row, mm.
-    """
-
-    image: Singles
-    blocks: Floats
-
-
-class TemplateArrays(NamedTuple):
-    """Holds the template of one unit: nodes as `unfold` makes them, cells, place at rest.
-
-    Blocks whose middle is farther than ``reach`` (mm) from its own hold nothing of it. From row to
-    row of the frame the unit moves by its drift, which is zero in the row of its middle.
+        nodes, kind: (4 n n,) nodes of the template of one unit; (n n,) kinds of its cells.
+        window: arrays of the pixels of a window, one after the other.
+        node: (window,) first number of the first of the four nodes about a pixel.
+        pairs, fours: sums of neighbours in a window.
+        lanes: (7, pixels / `LANES`) weighted residuals times derivatives, by `LANES` of pixels.
+        matrix, factor, inverse, scatter: (7, 7) normal matrix, its Cholesky factor, its inverse,
+            sum of the blocks' scores times themselves.
+        score, step, part: (7,) right-hand side, Gauss-Newton step, score of a block.
+        sums: (5,) information, the same with robust weights and with their loss's curvature;
+            robust weights, the same with squared residuals.
+        state, at: (7,) pose and photometry, and before the last step.
+        selected, moved: (3,) pose in which the pixels were selected, and how it has moved since, in
+            the unit's own frame as it was then, in nodes and rad.
+        box: (4,) rows and columns.
     """
 
     nodes: Singles
     kind: Image
-    half: float
-    step: float
-    x: float
-    y: float
-    reach: float
-    row: float
-    drift_x: float
-    drift_y: float
-    drift_turn: float
-
-
-class FitBuffers(NamedTuple):
-    """Arrays that the sums are made in.
-
-    Attributes:
-        rows: (7, 64) derivatives of the brightness after the unknowns, of a block's pixels.
-        residual: (64,) brightness less the template's.
-        weight: (64,) of the template, then with the robust one.
-        weighted: (64,) a row with its weights.
-        x, y: (64,) places on the unit.
-        chosen: (64,) pixels that are compared.
-        node: (64,) the first of the four about a pixel.
-        across, along: (64,) place among these.
-        mixed: (64, 4) what they tell.
-        matrix: (7, 7) normal matrix, lower triangle.
-        scores: (blocks, 7) right-hand sides by blocks.
-        sums: (5,) information, the same with robust weights and with their loss's curvature;
-            robust weights, the same with squared residuals.
-    """
-
-    rows: Singles
-    residual: Singles
-    weight: Singles
-    weighted: Singles
-    x: Singles
-    y: Singles
-    chosen: Indices
+    window: Singles
     node: Indices
-    across: Singles
-    along: Singles
-    mixed: Singles
+    pairs: Singles
+    fours: Singles
+    lanes: Singles
     matrix: Floats
-    scores: Floats
+    factor: Floats
+    inverse: Floats
+    scatter: Floats
+    score: Floats
+    step: Floats
+    part: Floats
     sums: Floats
+    state: Floats
+    at: Floats
+    selected: Floats
+    moved: Floats
+    box: Floats
 
 
-def workspace(blocks: int) -> FitBuffers:
-    """Allocates room for units of at most so many blocks."""
-
-    def line() -> Singles:
-        return np.zeros(_PIXELS, np.float32)
-
+def fit_buffers(pixels: int, nodes: int) -> FitBuffers:
+    """Allocates room for units of at most so many pixels, with so many nodes."""
+    window = np.zeros(_END, np.float32)
+    window[_ONE : _ONE + _WINDOW] = 1.0
+    square, line = (UNKNOWNS, UNKNOWNS), UNKNOWNS
     return FitBuffers(
-        np.zeros((UNKNOWNS, _PIXELS), np.float32),
-        line(),
-        line(),
-        line(),
-        line(),
-        line(),
-        np.zeros(_PIXELS, np.int32),
-        np.zeros(_PIXELS, np.int32),
-        line(),
-        line(),
-        np.zeros((_PIXELS, 4), np.float32),
-        np.zeros((UNKNOWNS, UNKNOWNS)),
-        np.zeros((blocks, UNKNOWNS)),
-        np.zeros(5),
+        nodes=np.zeros(4 * nodes, np.float32),
+        kind=np.zeros(nodes, np.uint8),
+        window=window,
+        node=np.zeros(_WINDOW, np.int32),
+        pairs=np.zeros(_WINDOW // 2, np.float32),
+        fours=np.zeros(_WINDOW // 4, np.float32),
+        lanes=np.zeros((UNKNOWNS, pixels // LANES + 1), np.float32),
+        matrix=np.zeros(square),
+        factor=np.zeros(square),
+        inverse=np.zeros(square),
+        scatter=np.zeros(square),
+        score=np.zeros(line),
+        step=np.zeros(line),
+        part=np.zeros(line),
+        sums=np.zeros(5),
+        state=np.zeros(line),
+        at=np.zeros(line),
+        selected=np.zeros(3),
+        moved=np.zeros(3),
+        box=np.zeros(4),
     )
 
 
 @inlined
-def _place(
-    scene: FramePixels, look: TemplateArrays, state: Floats, top: int, left: int, room: FitBuffers
-) -> None:
-    """Fills x, y with where a block's pixels are on the unit, in steps of the template's nodes."""
-    block = scene.blocks[top // SIZE, left // SIZE]
-    late = top + _MIDDLE - look.row
-    turn = state[2] + late * look.drift_turn
-    cos, sin = math.cos(turn) / look.step, math.sin(turn) / look.step
-    vx = block[0, 0] - look.x - state[0] - late * look.drift_x
-    vy = block[0, 1] - look.y - state[1] - late * look.drift_y
-    down_x = block[2, 0] - look.drift_x + look.drift_turn * vy
-    down_y = block[2, 1] - look.drift_y - look.drift_turn * vx
-    ahead_x = np.float32(cos * block[1, 0] + sin * block[1, 1])
-    ahead_y = np.float32(cos * block[1, 1] - sin * block[1, 0])
-    for row in range(SIZE):
-        x, y = room.x[SIZE * row : SIZE * (row + 1)], room.y[SIZE * row : SIZE * (row + 1)]
-        below = row - _MIDDLE
-        x_at, y_at = vx + below * down_x, vy + below * down_y
-        start_x = np.float32(cos * x_at + sin * y_at) - np.float32(_MIDDLE) * ahead_x
-        start_y = np.float32(cos * y_at - sin * x_at) - np.float32(_MIDDLE) * ahead_y
-        for column in range(SIZE):
-            x[column] = start_x + np.float32(column) * ahead_x
-            y[column] = start_y + np.float32(column) * ahead_y
-
-
-@inlined
-def _select(look: TemplateArrays, room: FitBuffers) -> int:
-    """Lists in chosen the pixels of a block that are to be compared; returns their number.
-
-    Fills node, across and along of all; cells at the rim of a template are empty.
-    """
-    node, chosen, kind = room.node, room.chosen, look.kind.reshape(-1)
-    size, zero = look.kind.shape[0], np.float32(0)
-    middle, most = np.float32((size - 1) // 2), np.float32(size - 1)
-    for k in range(_PIXELS):
-        u = min(max(room.x[k] + middle, zero), most)
-        v = min(max(room.y[k] + middle, zero), most)
-        iu, iv = np.int32(u), np.int32(v)
-        node[k] = iv * np.int32(size) + iu
-        room.across[k], room.along[k] = u - np.float32(iu), v - np.float32(iv)
-    n = 0
-    for k in range(_PIXELS):
-        chosen[n] = k
-        n += _COMPARED[kind[np.uint32(node[k])], k]
-    return n
-
-
-@inlined
 def _sample(
-    scene: FramePixels, look: TemplateArrays, top: int, left: int, count: int, room: FitBuffers
-) -> int:
-    """Reads frame and template at the pixels that are compared; returns their number, filled up.
+    look: TemplateArrays, lists: PixelLists, first: int, count: int, room: FitBuffers
+) -> None:
+    """Reads the template at pixels of the lists, on a unit that has moved since they were made.
 
-    Fills x, y, residual with the frame's brightness, weight, and rows 0, 1, 3 with slopes and value
-    of the template: mixed of those that the four nodes about a pixel extrapolate to halfway, which
-    is exact for parabolas. There are pixels without weight up to the next multiple of `_LANES`.
+    The brightness is mixed of what the four nodes about a pixel extrapolate to halfway, which is
+    exact for parabolas.
     """
-    nodes, kind, mixed, rows = look.nodes.reshape(-1), look.kind.reshape(-1), room.mixed, room.rows
-    one, half, four = np.float32(1), np.float32(0.5), np.uint64(4)
-    line = four * np.uint64(look.nodes.shape[1])
-    x, y, chosen = room.x, room.y, room.chosen
-    for n in range(np.uint64(count)):
-        k = np.uint64(chosen[n])
-        room.residual[n] = scene.image[np.uint64(top) + (k >> _ROW), np.uint64(left) + (k & _LAST)]
-        x[n], y[n] = x[k], y[k]  # k is n or beyond
-        node = np.uint64(room.node[k])
-        rows[2, n] = np.float32(kind[node] == STEEP)
-        a = four * node
-        c = a + line
-        fu, fv = room.across[k], room.along[k]
-        gu, gv = one - fu, one - fv
-        wa, wb, wc, wd = gu * gv, fu * gv, gu * fv, fu * fv
-        for i in range(four):
-            b, d = a + i + four, c + i + four
-            mixed[n, i] = wa * nodes[a + i] + wb * nodes[b] + wc * nodes[c + i] + wd * nodes[d]
-        u, v = a + _ONE, a + _TWO
-        bow_u = gv * (nodes[u] - nodes[u + four])
-        bow_u += fv * (nodes[u + line] - nodes[u + line + four])
-        bow_v = gu * (nodes[v] - nodes[v + line])
-        bow_v += fu * (nodes[v + four] - nodes[v + line + four])
-        rows[3, n] = half * (fu * gu * bow_u + fv * gv * bow_v)
+    window, node, size, moved = room.window, room.node, look.size, room.moved
+    line = np.uint64(4 * size)
+    zero, one, half, four = np.float32(0), np.float32(1), np.float32(0.5), np.uint64(4)
+    middle, most = np.float32((size - 1) // 2), np.float32(size - 2)
+    cos, sin = np.float32(math.cos(moved[2])), np.float32(math.sin(moved[2]))
+    shift_x, shift_y = np.float32(moved[0]), np.float32(moved[1])
+    x, y, steep = lists.x[first:], lists.y[first:], lists.steep[first:]
     for n in range(count):
-        rows[3, n] += mixed[n, 0]
-        rows[0, n] = rows[2, n] * mixed[n, 1]
-        rows[1, n] = rows[2, n] * mixed[n, 2]
-        room.weight[n] = mixed[n, 3]
-    whole = -(-count // _LANES) * _LANES
-    for n in range(count, whole):
-        room.weight[n] = room.residual[n] = rows[0, n] = rows[1, n] = rows[3, n] = 0
-    return whole
+        from_x, from_y = x[n] - shift_x, y[n] - shift_y
+        window[_X + n] = cos * from_x + sin * from_y
+        window[_Y + n] = cos * from_y - sin * from_x
+    for n in range(count):
+        u = min(max(window[_X + n] + middle, zero), most)
+        v = min(max(window[_Y + n] + middle, zero), most)
+        iu, iv = np.int32(u), np.int32(v)
+        node[n] = iv * np.int32(size) + iu
+        window[_ACROSS + n], window[_ALONG + n] = u - np.float32(iu), v - np.float32(iv)
+    for n in range(count):
+        upper = four * np.uint64(np.uint32(node[n]))
+        across, along = window[_ACROSS + n], window[_ALONG + n]
+        both = across * along
+        weights = (one - across - along + both, across - both, along - both, both)
+        mix_nodes(room.nodes, upper, upper + line, weights, window, np.uint64(_MIXED + n), _STRIDE)
+    for n in range(count):
+        slope_x, slope_y = window[_MIXED_X + n], window[_MIXED_Y + n]
+        bow_x = window[_ACROSS + n] * slope_x - window[_RIGHT + n]
+        bow_y = window[_ALONG + n] * slope_y - window[_LOWER + n]
+        window[_FACE + n] = window[_MIXED + n] + half * (bow_x + bow_y)
+        told = max(steep[n], zero)
+        window[_SLOPE_X + n], window[_SLOPE_Y + n] = told * slope_x, told * slope_y
+        window[_WEIGHT + n] *= min(steep[n], zero) + one
 
 
 @inlined
-def _derive(look: TemplateArrays, state: Floats, pixels: int, room: FitBuffers) -> None:
-    """Turns slopes and value of the template into derivatives and residual of the frame."""
-    rows, residual = room.rows, room.residual
-    cos, sin = np.float32(math.cos(state[2])), np.float32(math.sin(state[2]))
-    step = np.float32(look.step)
-    steepness, per_half = np.float32(state[3] / look.step), np.float32(look.step / look.half)
+def _weigh(
+    look: TemplateArrays,
+    state: Floats,
+    tight: float,
+    brightness: Singles,
+    count: int,
+    room: FitBuffers,
+) -> None:
+    """Fills residuals, with robust weights of Geman and McClure, and adds to the sums.
+
+    Places become the derivatives after the slopes of the light, which scales what it falls on.
+    """
+    window, per_half = room.window, np.float32(look.step / look.half)
     gain, offset = np.float32(state[3]), np.float32(state[4])
-    slope_x, slope_y = np.float32(state[5]), np.float32(state[6])
-    for k in range(pixels):
-        along_x, along_y = steepness * rows[0, k], steepness * rows[1, k]
-        x, y = room.x[k], room.y[k]
-        rows[0, k] = -cos * along_x + sin * along_y
-        rows[1, k] = -sin * along_x - cos * along_y
-        rows[2, k] = (along_x * y - along_y * x) * step
-        rows[4, k] = 1
-        lit = per_half * rows[3, k]
-        rows[5, k] = x * lit
-        rows[6, k] = y * lit
-        model = gain * rows[3, k] + offset + slope_x * rows[5, k] + slope_y * rows[6, k]
-        residual[k] -= model
-
-
-@inlined
-def _weigh(room: FitBuffers, tight: float, pixels: int) -> None:
-    """Applies robust weights of Geman and McClure, and adds to the sums."""
-    rows, residual, weight = room.rows, room.residual, room.weight
+    slope_x, slope_y = np.float32(state[5]) * per_half, np.float32(state[6]) * per_half
     full = left = curved = total = squares = np.float32(0)
-    narrow = np.float32(tight)
-    for k in range(pixels):
-        here = weight[k]
-        steep = rows[0, k] * rows[0, k] + rows[1, k] * rows[1, k]
-        square = residual[k] * residual[k]
-        closeness = np.float32(1) / (np.float32(1) + square * narrow)
-        robust = here * closeness * closeness
-        weight[k] = robust
-        full += here * steep
+    one, narrow = np.float32(1), np.float32(tight)
+    for n in range(count):
+        x, y, weight = window[_X + n], window[_Y + n], window[_WEIGHT + n]
+        along_x, along_y = window[_SLOPE_X + n], window[_SLOPE_Y + n]
+        window[_TURN + n] = along_x * y - along_y * x
+        face = window[_FACE + n]
+        lit_x, lit_y = x * face, y * face
+        window[_X + n], window[_Y + n] = lit_x, lit_y
+        residual = brightness[n] - (gain * face + offset + slope_x * lit_x + slope_y * lit_y)
+        steep, square = along_x * along_x + along_y * along_y, residual * residual
+        closeness = one / (one + square * narrow)
+        robust = weight * closeness * closeness
+        window[_RESIDUAL + n], window[_WEIGHT + n] = residual * robust, robust
+        full += weight * steep
         left += robust * steep
         curved += robust * steep * (np.float32(4) * closeness - np.float32(3))
         total += robust
@@ -263,82 +183,123 @@ def _weigh(room: FitBuffers, tight: float, pixels: int) -> None:
 
 
 @inlined
-def _add(room: FitBuffers, scores: Floats, pixels: int) -> None:
-    """Adds a block to the matrix and fills its scores."""
-    rows, residual, weight, matrix = room.rows, room.residual, room.weight, room.matrix
-    scaled = room.weighted
+def _add(count: int, room: FitBuffers) -> None:
+    """Adds the weighted products of the derivatives to the lower triangle of the matrix."""
+    window, matrix = room.window, room.matrix
     for i in range(UNKNOWNS):
-        score = np.float32(0)
-        for k in range(pixels):
-            scaled[k] = weight[k] * rows[i, k]
-            score += scaled[k] * residual[k]
-        scores[i] = score
+        for n in range(count):
+            window[_ROOM + n] = window[_WEIGHT + n] * window[_APART * i + n]
         for j in range(i + 1):
             product = np.float32(0)
-            for k in range(pixels):
-                product += scaled[k] * rows[j, k]
+            for n in range(count):
+                product += window[_ROOM + n] * window[_APART * j + n]
             matrix[i, j] += product
 
 
 @inlined
-def _within(scene: FramePixels, look: TemplateArrays, state: Floats, top: int, left: int) -> bool:
-    middle = scene.blocks[top // SIZE, left // SIZE, 0]
-    x, y = middle[0] - look.x - state[0], middle[1] - look.y - state[1]
-    return x * x + y * y < look.reach * look.reach
+def _score(count: int, first: int, room: FitBuffers) -> None:
+    """Fills lanes from the first on with sums of residuals times derivatives, and adds them up.
+
+    Sums are made of two neighbours, three times over: compilers know how to do many at once.
+    """
+    window, two, four = room.window, room.pairs, room.fours
+    for i in range(UNKNOWNS):
+        lanes, total = room.lanes[i, first:], np.float32(0)
+        for n in range(count // 2):
+            even = window[_RESIDUAL + 2 * n] * window[_APART * i + 2 * n]
+            two[n] = even + window[_RESIDUAL + 2 * n + 1] * window[_APART * i + 2 * n + 1]
+        for n in range(count // 4):
+            four[n] = two[2 * n] + two[2 * n + 1]
+        for n in range(count // LANES):
+            lanes[n] = four[2 * n] + four[2 * n + 1]
+        for n in range(count // LANES):
+            total += lanes[n]
+        room.score[i] += total
+
+
+@inlined
+def _after_unknowns(look: TemplateArrays, state: Floats, vector: Floats) -> None:
+    """Makes derivatives (7,) after the unknowns of those of the basis."""
+    steepness, per_half = state[3] / look.step, look.step / look.half
+    cos, sin = steepness * math.cos(state[2]), steepness * math.sin(state[2])
+    x, y = vector[0], vector[1]
+    vector[0], vector[1] = sin * y - cos * x, -sin * x - cos * y
+    vector[2] *= state[3]
+    vector[5] *= per_half
+    vector[6] *= per_half
+
+
+@inlined
+def _products_after_unknowns(look: TemplateArrays, state: Floats, matrix: Floats) -> None:
+    """Makes products (7, 7) of derivatives those of the unknowns; the lower triangle is read."""
+    for i in range(UNKNOWNS):
+        for j in range(i):
+            matrix[j, i] = matrix[i, j]
+    for i in range(UNKNOWNS):
+        _after_unknowns(look, state, matrix[i])
+    for i in range(UNKNOWNS):
+        _after_unknowns(look, state, matrix[:, i])
 
 
 @inlined
 def gather_equations(
-    scene: FramePixels,
-    look: TemplateArrays,
-    state: Floats,
-    box: Floats,
-    every: int,
-    tight: float,
-    room: FitBuffers,
-) -> int:
-    """Fills matrix, scores and sums; returns the number of blocks.
+    look: TemplateArrays, lists: PixelLists, pixels: int, tight: float, room: FitBuffers
+) -> None:
+    """Fills lanes, sums, matrix and score, these two of the unknowns.
 
     Args:
-        scene: the frame.
         look: the unit.
-        state: (7,) pose and photometry.
-        box: top, bottom, left, right of the pixels to look at, the first of each on a block.
-        every: one of so many blocks is taken.
+        lists: its pixels.
+        pixels: number of them.
         tight: one over the squared scale of the robust weights.
-        room: filled.
+        room: with the state, and how it has moved; filled.
     """
     room.matrix[:] = 0.0
+    room.score[:] = 0.0
     room.sums[:] = 0.0
-    count = 0
-    for top in range(int(box[0]), int(box[1]), SIZE):
-        for left in range(int(box[2]), int(box[3]), SIZE):
-            if every > 1 and (top // SIZE + left // SIZE) % every:
-                continue
-            if not _within(scene, look, state, top, left):
-                continue
-            _place(scene, look, state, top, left, room)
-            pixels = _sample(scene, look, top, left, _select(look, room), room)
-            if pixels > 0:
-                _derive(look, state, pixels, room)
-                _weigh(room, tight, pixels)
-                _add(room, room.scores[count], pixels)
-                count += 1
-    return count
+    for first in range(0, pixels, _WINDOW):
+        count = min(_WINDOW, pixels - first)
+        _sample(look, lists, first, count, room)
+        _weigh(look, room.state, tight, lists.brightness[first:], count, room)
+        _add(count, room)
+        _score(count, first // LANES, room)
+    _products_after_unknowns(look, room.state, room.matrix)
+    _after_unknowns(look, room.state, room.score)
+    for k in range(3):
+        room.sums[k] *= (room.state[3] / look.step) ** 2
+
+
+@inlined
+def gather_scatter(look: TemplateArrays, ends: Indices, blocks: int, room: FitBuffers) -> None:
+    """Fills the scatter of blocks, which begin and end in the lanes where it says."""
+    part, scatter = room.part, room.scatter
+    scatter[:] = 0.0
+    for block in range(blocks):
+        part[:] = 0.0
+        for lane in range(ends[block], ends[block + 1]):
+            for i in range(UNKNOWNS):
+                part[i] += room.lanes[i, lane]
+        for i in range(UNKNOWNS):
+            for j in range(i + 1):
+                scatter[i, j] += part[i] * part[j]
+    _products_after_unknowns(look, room.at, scatter)
 
 
 @inlined
 def _factor(matrix: Floats, factor: Floats) -> bool:
-    """Factors by Cholesky from the lower triangle; returns False if it is singular."""
+    """Factors by Cholesky from the lower triangle; returns False if it is singular.
+
+    The factor's diagonal is inverted.
+    """
     for i in range(len(matrix)):
         for j in range(i + 1):
             total = matrix[i, j]
             for k in range(j):
                 total -= factor[i, k] * factor[j, k]
             if i != j:
-                factor[i, j] = total / factor[j, j]
+                factor[i, j] = total * factor[j, j]
             elif total > 1e-10 * matrix[i, i]:
-                factor[i, i] = math.sqrt(total)
+                factor[i, i] = 1 / math.sqrt(total)
             else:
                 return False
     return True
@@ -350,21 +311,22 @@ def invert(matrix: Floats, factor: Floats, inverse: Floats) -> bool:
 
     Args:
         matrix: (n, n); its lower triangle is read.
-        factor: (n, n) room for the Cholesky factor.
-        inverse: (n, n) filled.
+        factor: (n, n) room for the Cholesky factor L, and its inverse.
+        inverse: (n, n) filled with L'^-1 L^-1.
     """
     size = len(matrix)
     if not _factor(matrix, factor):
         return False
     for column in range(size):
-        for i in range(size):
-            total = 1.0 if i == column else 0.0
-            for k in range(i):
-                total -= factor[i, k] * inverse[k, column]
-            inverse[i, column] = total / factor[i, i]
-        for i in range(size - 1, -1, -1):
-            total = inverse[i, column]
-            for k in range(i + 1, size):
-                total -= factor[k, i] * inverse[k, column]
-            inverse[i, column] = total / factor[i, i]
+        for i in range(column + 1, size):
+            total = factor[i, column] * factor[column, column]
+            for k in range(column + 1, i):
+                total += factor[i, k] * factor[k, column]
+            factor[i, column] = -total * factor[i, i]
+    for i in range(size):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(i, size):
+                total += factor[k, i] * factor[k, j]
+            inverse[i, j] = inverse[j, i] = total
     return True

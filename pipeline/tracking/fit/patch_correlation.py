@@ -13,14 +13,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.runtime import compiled, inlined
-from pipeline.tracking.fit.normal_equations import (
+from pipeline.runtime import inlined, uncounted
+from pipeline.tracking.fit.compared_pixels import (
     SIZE,
+    FramePixels,
+    PixelLists,
+    TemplateArrays,
+    cut_out,
+    select_pixels,
+)
+from pipeline.tracking.fit.normal_equations import (
     UNKNOWNS,
     FitBuffers,
-    FramePixels,
-    TemplateArrays,
     gather_equations,
+    gather_scatter,
     invert,
 )
 from pipeline.tracking.fit.template_cells import TemplateCells, unfold
@@ -40,6 +46,10 @@ _FLOOR = 0.04
 """Smallest scale of the robust weights, in contrasts of the unit; or so many times the noise: """
 _SCALE = 4.0
 _UNKNOWN = 1e6
+_ALL = 3
+"""Place of all pixels in the lists, behind those of one, two and three quarters of the blocks."""
+_FEWEST = 5.0
+"""Weights of pixels that a quarter of the blocks needs at least."""
 
 
 class Templates(NamedTuple):
@@ -151,15 +161,20 @@ def _box(shape: tuple[int, int], middle: Floats, radius: float, box: Floats) -> 
 
 
 @inlined
-def _stepped(inverse: Floats, scores: Floats, first: int, step: Floats) -> None:
+def _solve(room: FitBuffers, first: int) -> None:
     """Fills the Gauss-Newton step of the unknowns from ``first`` on, zero for the others."""
-    step[:] = 0.0
-    for j in range(first, UNKNOWNS):
-        total = 0.0
-        for block in range(len(scores)):
-            total += scores[block, j]
-        for i in range(first, UNKNOWNS):
-            step[i] += inverse[i, j] * total
+    for i in range(UNKNOWNS):
+        room.step[i] = 0.0
+        for j in range(first, UNKNOWNS if i >= first else first):
+            room.step[i] += room.inverse[i, j] * room.score[j]
+
+
+@inlined
+def _advance(room: FitBuffers, stride: float) -> None:
+    """Goes on by the step, so many times as long."""
+    for i in range(UNKNOWNS):
+        room.at[i] = room.state[i]
+        room.state[i] += stride * room.step[i]
 
 
 @inlined
@@ -189,84 +204,99 @@ def _stride(sums: Floats) -> float:
 
 
 @inlined
+def _compare(look: TemplateArrays, room: FitBuffers) -> None:
+    """Fills how the unit has moved since its pixels were selected."""
+    state, before = room.state, room.selected
+    cos, sin = math.cos(before[2]) / look.step, math.sin(before[2]) / look.step
+    x, y = state[0] - before[0], state[1] - before[1]
+    room.moved[0], room.moved[1] = cos * x + sin * y, cos * y - sin * x
+    room.moved[2] = state[2] - before[2]
+
+
+@inlined
 def _descend(
-    scene: FramePixels,
-    look: TemplateArrays,
-    aim: FitTarget,
-    box: Floats,
-    state: Floats,
-    inverse: Floats,
-    room: FitBuffers,
-) -> tuple[float, int]:
+    scene: FramePixels, look: TemplateArrays, aim: FitTarget, lists: PixelLists, room: FitBuffers
+) -> float:
     """Improves the state of one unit.
 
+    Pixels are selected anew where it has moved on by more than a part of a pixel.
+
     Returns:
-        Length of the last step in px, negative if it failed, and number of blocks.
+        Length of the last step in px, negative if it failed.
     """
-    step, factor = np.empty(UNKNOWNS), np.zeros((UNKNOWNS, UNKNOWNS))
     blind, new = aim.tight == 0.0, aim.tight == 0.0 and aim.noise == 0.0
-    moved, count, rough = -1.0, 0, 4 if aim.radius > _LARGE else 2
-    scale = _UNKNOWN if new else max(aim.contrast * abs(state[3]), aim.tight)
+    moved, way, rough = -1.0, _UNKNOWN, 0 if aim.radius > _LARGE else 1
+    scale = _UNKNOWN if new else max(aim.contrast * abs(room.state[3]), aim.tight)
     for turn in range(0 if new else 1, aim.most + 1):
-        every = 4 if turn == 0 else (rough if turn == 1 and blind else 1)
-        count = gather_equations(scene, look, state, box, every, 1 / (scale * scale), room)
+        part = 0 if turn == 0 else (rough if turn == 1 and blind else _ALL)
+        if way > _NEAR:
+            select_pixels(scene, look, room.state, room.box, lists)
+            way = 0.0
+            for i in range(POSE):
+                room.selected[i] = room.state[i]
+        _compare(look, room)
+        gather_equations(look, lists, lists.pixels[part], 1 / (scale * scale), room)
         if turn == 0:
             _hold_pose(room.matrix)
-        if not (room.sums[3] > 20 / every and invert(room.matrix, factor, inverse)):
-            return -1.0, count
-        _stepped(inverse, room.scores[:count], POSE if turn == 0 else 0, step)
+        if not (
+            room.sums[3] > _FEWEST * (part + 1) and invert(room.matrix, room.factor, room.inverse)
+        ):
+            return -1.0
+        _solve(room, POSE if turn == 0 else 0)
+        step = room.step
         moved = max(math.hypot(step[0], step[1]) * aim.scale, abs(step[2]) * aim.radius)
-        stride = _stride(room.sums) if moved < _NEAR else 1.0
-        state += step * min(stride, _LONGEST / max(moved, 1e-9))
-        before, gain = scale, abs(state[3])
+        stride = min(_stride(room.sums) if moved < _NEAR else 1.0, _LONGEST / max(moved, 1e-9))
+        _advance(room, stride)
+        way += moved * stride
+        past, gain = scale, abs(room.state[3])
         scale = aim.contrast * gain if turn == 0 else _next_scale(scale, moved, gain, aim, room)
-        if turn > 0 and every == 1 and moved < _STILL and scale > 0.7 * before:
+        if turn > 0 and part == _ALL and moved < _STILL and scale > 0.7 * past:
             break
-    return moved, count
+    return moved
 
 
 @inlined
 def _summarise(
-    state: Floats,
-    inverse: Floats,
+    look: TemplateArrays,
+    lists: PixelLists,
     room: FitBuffers,
-    count: int,
     full: float,
     moved: float,
     out: Floats,
 ) -> None:
     """Writes a unit's row as `unpack` reads it."""
-    out[:] = 0.0
-    out[:UNKNOWNS] = state
-    told = len(TOLD)
-    part, sums = np.empty(told), room.sums
+    told, sums, inverse, half = len(TOLD), room.sums, room.inverse, room.part
     white, blocks, last = UNKNOWNS, UNKNOWNS + _SQUARE, UNKNOWNS + 2 * _SQUARE
-    for block in range(count):
-        for i in range(told):
-            part[i] = 0.0
-            for j in range(UNKNOWNS):
-                part[i] += inverse[TOLD[i], j] * room.scores[block, j]
-        for i in range(told):
-            for j in range(told):
-                out[blocks + told * i + j] += part[i] * part[j]
+    gather_scatter(look, lists.ends, lists.blocks[_ALL], room)
+    for i in range(UNKNOWNS):
+        out[i] = room.state[i]
     for i in range(told):
+        half[:] = 0.0
+        for k in range(UNKNOWNS):
+            for j in range(UNKNOWNS):
+                half[j] += inverse[TOLD[i], k] * room.scatter[k, j]
         for j in range(told):
+            total = 0.0
+            for k in range(UNKNOWNS):
+                total += half[k] * inverse[TOLD[j], k]
+            out[blocks + told * i + j] = total
             out[white + told * i + j] = inverse[TOLD[i], TOLD[j]]
-    gain = state[3] * state[3]
+    gain = room.state[3] * room.state[3]
     out[last] = math.sqrt(sums[4] / sums[3])
     out[last + 1] = sums[1] / max(full * gain, sums[0])
-    out[last + 2] = count
+    out[last + 2] = lists.blocks[_ALL]
     out[last + 3] = moved
     out[last + 4] = sums[0] / gain
 
 
-@compiled
+@uncounted
 def fit_patches(
     scene: FramePixels,
     templates: Templates,
     start: FitStart,
     chosen: Mask,
     most: int,
+    lists: PixelLists,
     room: FitBuffers,
     out: Floats,
 ) -> None:
@@ -278,12 +308,11 @@ def fit_patches(
         start: where to start.
         chosen: (units,) which to fit.
         most: largest number of full steps.
-        room: for the largest of the units.
+        lists: for the pixels of the largest of the units.
+        room: for that one.
         out: filled; NaN where a unit cannot be fitted.
     """
-    inverse = np.zeros((UNKNOWNS, UNKNOWNS))
-    box, state = np.empty(4), np.empty(UNKNOWNS)
-    nodes = np.zeros((*templates.weight.shape[1:], 4), np.float32)
+    box, size = room.box, templates.weight.shape[1]
     for unit in range(len(chosen)):
         out[unit] = np.nan
         if not chosen[unit]:
@@ -292,10 +321,14 @@ def fit_patches(
         if box[1] - box[0] < 4 or box[3] - box[2] < 4:
             continue
         cells = templates.cells
-        unfold(templates.brightness[unit], templates.weight[unit], cells.span[unit], nodes)
+        cut_out(scene, box, lists)
+        kind = cells.kind[unit].reshape(-1)
+        for node in range(size * size):  # one after the other, before they are read here and there
+            room.kind[node] = kind[node]
+        unfold(templates.brightness[unit], templates.weight[unit], cells.span[unit], room.nodes)
         look = TemplateArrays(
-            nodes,
-            cells.kind[unit],
+            room.kind,
+            size,
             templates.half,
             templates.step,
             templates.centre[unit, 0],
@@ -306,7 +339,8 @@ def fit_patches(
             start.drift[unit, 1],
             start.drift[unit, 2],
         )
-        state[:] = start.state[unit]
+        for i in range(UNKNOWNS):
+            room.state[i] = start.state[unit, i]
         aim = FitTarget(
             templates.contrast[unit],
             start.scale[unit],
@@ -315,9 +349,10 @@ def fit_patches(
             start.tight[unit],
             most,
         )
-        moved, count = _descend(scene, look, aim, box, state, inverse, room)
+        moved = _descend(scene, look, aim, lists, room)
         if moved >= 0.0:
-            _summarise(state, inverse, room, count, start.full[unit], moved, out[unit])
+            out[unit] = 0.0
+            _summarise(look, lists, room, start.full[unit], moved, out[unit])
 
 
 def unpack(out: Floats) -> PoseFits:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.ndimage import spline_filter
 
 from pipeline.runtime import Picture, compiled, inlined
-from pipeline.tracking.fit.normal_equations import SIZE
+from pipeline.tracking.fit.compared_pixels import SIZE
 from pipeline.tracking.fit.patch_correlation import Templates
 from pipeline.tracking.fit.template_cells import classify_templates
 from pipeline.tracking.geometry import Camera, Depth, SpecimenOutlines

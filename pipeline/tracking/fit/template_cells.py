@@ -24,8 +24,8 @@ class TemplateCells(NamedTuple):
 
     Attributes:
         kind: (units, rows, columns) EMPTY, FLAT or STEEP.
-        span: (units, rows, 2) first node of the row that a cell with weight needs, and the last
-            one's follower.
+        span: (units, rows, 2) first node of the row that a cell with weight, or one beside it,
+            needs, and the last one's follower.
     """
 
     kind: Image
@@ -88,32 +88,35 @@ def classify(
                 steep = max(across, along) > least
                 steep |= max(abs(across_all), abs(along_all)) > least_sum
                 kind[row, k] = STEEP if steep else FLAT
-                first, last = min(first, k), k + 2
+                first, last = min(first, max(k - 1, 2)), min(k + 3, size - 2)
         if last > 0:
-            for line in (row, row + 1):
+            for line in range(max(row - 1, 2), min(row + 3, size - 2)):
                 span[line, 0] = min(first, span[line, 0]) if span[line, 1] > 0 else first
                 span[line, 1] = max(last, span[line, 1])
 
 
 @inlined
 def unfold(brightness: Singles, weight: Singles, span: NodeSpans, nodes: Singles) -> None:
-    """Fills nodes (rows, columns, 4) in the spans: brightness, its slopes in x and y, and weight.
+    """Fills nodes (4 rows columns,) in the spans: brightness, its slopes in x and y, and weight.
 
     The slopes are differences of fourth order, per node. One unit's nodes at a time fit a
     processor's cache, which all units' do not; beyond the spans they stay as they are.
     """
-    near, far = np.float32(8 / 12), np.float32(1 / 12)
-    for row in range(2, brightness.shape[0] - 2):
-        start, count = span[row, 0], span[row, 1] - span[row, 0]
+    near, far, size = np.float32(8 / 12), np.float32(1 / 12), brightness.shape[1]
+    faces, masks = brightness.reshape(-1), weight.reshape(-1)
+    for row in range(2, size - 2):
+        count, first = span[row, 1] - span[row, 0], size * row + span[row, 0]
         if count <= 0:
             continue
-        here, below, above = brightness[row], brightness[row - 1], brightness[row + 1]
-        before, at, after = here[start - 1 :], here[start:], here[start + 1 :]
-        first, last = here[start - 2 :], here[start + 2 :]
-        lowest, highest = brightness[row - 2, start:], brightness[row + 2, start:]
-        low, high, mask, out = below[start:], above[start:], weight[row, start:], nodes[row, start:]
+        at, mask, out = faces[first:], masks[first:], nodes[4 * first :]
+        left, right = faces[first - 1 :], faces[first + 1 :]
+        farther_left, farther_right = faces[first - 2 :], faces[first + 2 :]
+        low, high = faces[first - size :], faces[first + size :]
+        lowest, highest = faces[first - 2 * size :], faces[first + 2 * size :]
         for k in range(count):
-            out[k, 0] = at[k]
-            out[k, 1] = near * (after[k] - before[k]) - far * (last[k] - first[k])
-            out[k, 2] = near * (high[k] - low[k]) - far * (highest[k] - lowest[k])
-            out[k, 3] = mask[k]
+            x, farther_x = right[k] - left[k], farther_right[k] - farther_left[k]
+            y, farther_y = high[k] - low[k], highest[k] - lowest[k]
+            out[4 * k] = at[k]
+            out[4 * k + 1] = near * x - far * farther_x
+            out[4 * k + 2] = near * y - far * farther_y
+            out[4 * k + 3] = mask[k]

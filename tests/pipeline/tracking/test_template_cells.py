@@ -28,7 +28,7 @@ def test_nodes_are_unfolded_wherever_a_cell_reads_them() -> None:
     brightness, weight = _template()
     made = template_cells.classify_templates(brightness[None], weight[None], np.array([50.0]))
     nodes = np.full((SIZE, SIZE, 4), np.nan, np.float32)
-    template_cells.unfold(brightness, weight, made.span[0], nodes)
+    template_cells.unfold(brightness, weight, made.span[0], nodes.reshape(-1))
     used = made.kind[0] != template_cells.EMPTY
     for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
         read = np.roll(used, (row, column), (0, 1))
