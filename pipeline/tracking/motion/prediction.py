@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.tracking.geometry import rigid_motion, rotation_matrix
-from sim.core import Floats, Mask
+from sim.core import Floats, Ints, Mask
 
 _NEAREST = 6
 
@@ -39,6 +39,8 @@ class Neighbourhood:
 
     def __init__(self, centre: Floats) -> None:
         self._centre = centre
+        self._judged = np.zeros(0, dtype=bool)
+        self._voters: tuple[Ints, Ints, Floats, Floats]
         self._apart = cKDTree(centre).query(centre, k=2)[0][:, 1]
 
     def collisions(self, found: Floats, good: Mask, least: float) -> Mask:
@@ -113,19 +115,26 @@ class Neighbourhood:
         Only the nearest ones vote, and an affine map of them, so that strain is no stray.
         """
         out = np.zeros(len(found), dtype=bool)
-        places = np.nonzero(good)[0]
-        if len(places) < 9:
+        if np.count_nonzero(good) < 9:
             return out
+        if not np.array_equal(good, self._judged):
+            self._judged, self._voters = good.copy(), self._affine_voters(good)
+        places, near, offset, inverse = self._voters
         now = self._centre + found[:, :2]
-        tree = cKDTree(self._centre[places])
-        near = places[tree.query(self._centre[places], k=9)[1][:, 1:]]
-        rows = np.concatenate([self._centre[near], np.ones((*near.shape, 1))], axis=2)
-        offset = rows - np.append(self._centre[places], np.zeros((len(places), 1)), axis=1)[:, None]
-        normal = np.einsum("uki,ukj->uij", offset, offset) + 1e-6 * np.eye(3)
-        right = np.einsum("uki,ukj->uij", offset, now[near])
-        expected = np.linalg.solve(normal, right)[:, 2]
-        middle = np.median(
-            now[near] - np.einsum("uki,uij->ukj", offset, np.linalg.solve(normal, right)), axis=1
-        )
-        out[places] = np.linalg.norm(now[places] - expected - middle, axis=1) > most
+        fit = inverse @ np.einsum("uki,ukj->uij", offset, now[near])
+        middle = np.median(now[near] - offset @ fit, axis=1)
+        out[places] = np.linalg.norm(now[places] - fit[:, 2] - middle, axis=1) > most
         return out
+
+    def _affine_voters(self, good: Mask) -> tuple[Ints, Ints, Floats, Floats]:
+        """Lists good units (n,) with the nearest ones (n, 8), and what an affine map of them needs.
+
+        That is their places (n, 8, 3) from the unit's own, with a one, and the inverse (n, 3, 3) of
+        the normal matrix.
+        """
+        places = np.nonzero(good)[0]
+        near = places[cKDTree(self._centre[places]).query(self._centre[places], k=9)[1][:, 1:]]
+        away = self._centre[near] - self._centre[places][:, None]
+        offset = np.concatenate([away, np.ones((*near.shape, 1))], axis=2)
+        normal = np.einsum("uki,ukj->uij", offset, offset) + 1e-6 * np.eye(3)
+        return places, near, offset, np.linalg.inv(normal)
