@@ -6,7 +6,9 @@ the radius (Kannala and Brandt, IEEE TPAMI 28 (2006) 1335, as OpenCV has it). Pi
 centre of the top left one.
 """
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -78,6 +80,12 @@ class Camera:
         flat = offset + self.centre
         points = flat @ inverse[:2, :2].T + inverse[:2, 2]
         return points / (flat @ inverse[2, :2] + inverse[2, 2])[..., None]
+
+    def facing(self, points: Floats, pixels: Floats) -> Camera:
+        """Returns one of the same lens that sees points (n, 2) at pixels: another homography."""
+        ratio = self._undistorting(pixels)[..., None]
+        flat = self.centre + (pixels - self.centre) * ratio
+        return replace(self, homography=fit_homography(points, flat))
 
     def _undistorting(self, pixels: Floats) -> Floats:
         """Solves for the radius (...) without distortion over that with it, by Newton's method."""

@@ -143,23 +143,32 @@ def calibrate_camera(
 def best_orientations(
     image: Picture, specimen: SpecimenOutlines, detections: list[LatticeDetection]
 ) -> list[LatticeDetection]:
-    """Keeps those of several ways to see a specimen that its outlines fit as well as any."""
+    """Keeps those of several ways to see a specimen that its outlines fit as well as any.
+
+    All are seen through one lens, which that way tells that matches most.
+    """
     if len(detections) == 1:
         return detections
+    lens = with_distortion(specimen, max(detections, key=lambda one: one.score)).camera
     pixel = _pixel(specimen, detections[0].camera)
     grid = TemplateGrid(specimen, 1 / pixel, (3 * _USUAL_BLUR + 2) * pixel)
     templates = outline_templates(grid, _USUAL_BLUR * pixel, pixel)
-    wrong = [_unlikeness(image, specimen, templates, one) for one in detections]
+    wrong = [_unlikeness(image, specimen, templates, lens, one) for one in detections]
     return [
         one for one, found in zip(detections, wrong, strict=True) if found <= _ALIKE * min(wrong)
     ]
 
 
 def _unlikeness(
-    image: Picture, specimen: SpecimenOutlines, templates: Templates, detection: LatticeDetection
+    image: Picture,
+    specimen: SpecimenOutlines,
+    templates: Templates,
+    lens: Camera,
+    detection: LatticeDetection,
 ) -> float:
     """Multiplies residuals of outlines by rotations: outlines of others are turned to fit."""
-    fitter = PoseFitter(with_distortion(specimen, detection).camera, templates)
+    camera = lens.facing(specimen.centre[detection.unit], detection.blob)
+    fitter = PoseFitter(camera, templates)
     fits = fitter.fit(image, *fitter.start(_gain(image, detection)))
     found = np.isfinite(fits.pose[:, 2])
     if found.mean() < _FOUND:
