@@ -26,6 +26,8 @@ _SMALLEST = 0.25
 """Least area of a patch, over that of a unit: at the rim of a wide picture they are small."""
 _MARGIN = 1.0
 """A unit nearer to the rim of the picture is not expected to be a patch of its own, radii."""
+_SMOOTH = 32
+"""Pixels a pitch that shades about a unit need at most."""
 _BLANK = 0.25  # of the contrast: what differs more from a face's own shade is a mark
 _MARKED = 0.02  # of a face
 _DOTS = 4
@@ -182,11 +184,17 @@ def find_blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright:
     window = int(pitch * 2) | 1
     signed = image.astype(np.float32) * (1 if bright else -1)
     grey = cv2.GaussianBlur(signed, (0, 0), max(0.02 * pitch, 0.5))
-    low = cv2.erode(grey, np.ones((window, window), np.uint8))
-    high = cv2.dilate(grey, np.ones((window, window), np.uint8))
-    middle = cv2.blur((low + high) / 2, (window, window))
+    few = max(1, int(pitch / _SMOOTH))  # what is local is so over pitches
+    window = window // few | 1
+    low, high = (
+        change(grey[::few, ::few], np.ones((window, window), np.uint8))
+        for change in (cv2.erode, cv2.dilate)
+    )
     contrast = cv2.blur(high - low, (window, window))
-    mask = ((grey > middle) & (contrast > 0.3 * np.percentile(contrast, 90))).astype(np.uint8)
+    least = 0.3 * np.percentile(contrast, 90)
+    middle = cv2.blur((low + high) / 2, (window, window))
+    middle, contrast = (cv2.resize(each, grey.shape[::-1]) for each in (middle, contrast))
+    mask = ((grey > middle) & (contrast > least)).astype(np.uint8)
     filled = _filled(mask, 0.3 * float(np.median(specimen.area)) * scale**2)
     size = max(int(0.12 * pitch) | 1, 3)
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
