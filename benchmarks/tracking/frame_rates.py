@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.harness import MeasuringLimits, Tell
-from benchmarks.tracking import known_patches, plain_opencv, wild_clips
+from benchmarks.tracking import known_patches, plain_opencv, speed, wild_clips
 from pipeline.runtime import UserError
 from pipeline.tracking.frames import Frame, import_video, read_frames
 from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design
@@ -73,6 +73,7 @@ def measure(folder: Path, limits: MeasuringLimits, tell: Tell) -> xr.Dataset:
     with tempfile.TemporaryDirectory() as made:
         for row in wild_clips.table(Path(made)):
             tell(row)
+        tell(speed.table(Path(made)))
     tell(known_patches.table())
     rate = np.array([[one.rate / thinning for thinning in THINNINGS] for one in clips])
     dims = ("video", "tracker", "thinning")

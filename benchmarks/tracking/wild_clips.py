@@ -123,7 +123,11 @@ def specimen(grid: Mapping[str, Any] = GRID) -> SpecimenOutlines:
 
 def make(name: str, folder: Path, frames: int | None = None) -> WildClip:
     """Renders a clip of the catalogue, or its first frames; a folder holds what has a codec."""
-    script = SCRIPTS[name]
+    return film(SCRIPTS[name], folder / f"{name}.mkv", frames)
+
+
+def film(script: ClipScript, path: Path, frames: int | None = None) -> WildClip:
+    """Renders a clip, or its first frames; what has a codec goes through a file."""
     shown = specimen(script.grid)
     times = script.times[:frames]
     own, seen = _motions(shown, script)
@@ -137,7 +141,7 @@ def make(name: str, folder: Path, frames: int | None = None) -> WildClip:
     fault[[one for one in script.fault if one < len(times)]] = True
     truth = own(times) if script.follows else seen(times)
     return WildClip(
-        list(_filmed(images, stamps, script, folder / f"{name}.mkv")),
+        list(_filmed(images, stamps, script, path)),
         shown,
         script.view.scale,
         truth - truth[0],
