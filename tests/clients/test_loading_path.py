@@ -53,7 +53,11 @@ def test_units_that_are_cut_out_are_not_drawn(browser: Chrome) -> None:
 
 def test_colours_begin_with_that_of_the_figure(browser: Chrome) -> None:
     menu = Select(browser.find_element(By.ID, "player-field"))
-    assert [option.text for option in menu.options] == ["uy", "ux", "θ"]
+    assert [option.text for option in menu.options] == [
+        "displacement along y",
+        "displacement along x",
+        "θ",
+    ]
     plate = browser.find_element(By.CSS_SELECTOR, ".plate svg")
     assert plate.size["width"] > 700
 

@@ -102,11 +102,11 @@ def test_angle_and_colour_change_the_picture(desktop: Chrome) -> None:
     seen = {picture(desktop, 0)}
     choose(desktop, "case", "α = 90°")
     seen.add(picture(desktop, 0))
-    for colour, unit in (("uy", "mm"), ("θ", "°")):
+    for colour, symbol, unit in (("displacement along y", "u", "mm"), ("θ", "θ", "°")):
         choose(desktop, "field", colour)
         seen.add(picture(desktop, 0))
         bar = desktop.find_element(By.CSS_SELECTOR, "#player .bar").text
-        assert colour in bar
+        assert symbol in bar
         assert unit in bar
     assert len(seen) == 4
     assert complaints(desktop) == []

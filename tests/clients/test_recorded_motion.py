@@ -58,7 +58,7 @@ def test_the_residual_has_a_view_of_its_own(page: Chrome) -> None:
     assert Select(view).first_selected_option.text == "residual: measured less simulated"
     assert [picture(page, k) != old for k, old in enumerate(motion)] == [True, True]
     assert "residual |U|" in page.find_element(By.CSS_SELECTOR, "#player .bar").text
-    choose(page, "field", "uy")
+    choose(page, "field", "displacement along y")
     choose(page, "view", "motion")
     assert complaints(page) == []
 
