@@ -23,7 +23,7 @@ WORST = 10
 """Number of the shims, bent most before any load, that are marked."""
 
 _CROSS = 3.0
-_ID, _SMALLEST = 6.5, 3.0  # points
+_ID, _SMALLEST = 6.5, 5.0  # points; on units too small for that an id reaches beyond
 _ASPECT = 0.75  # a letter's width to its size, with some room
 _NUMBER, _DIGIT = 7.5, (0.556, 0.71)  # points; width and height of a digit to its size
 _AROUND = 0.25  # mm around a number
