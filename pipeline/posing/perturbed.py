@@ -44,7 +44,11 @@ class PerturbedResponse(NamedTuple):
 
 
 def noises(asked: Robustness, spacing: float) -> list[Noise]:
-    """Lists the imperfections that a problem asks for, of a lattice of some spacing in mm."""
+    """Lists the imperfections that a problem asks for, of a lattice of some spacing in mm.
+
+    Those that copies have together come alone as well, and then a factor common to all ligaments of
+    each of the three stiffnesses.
+    """
     found = [
         *(
             Noise(f"geometry {100 * size:g} %", Perturbation(geometry=size * spacing))
@@ -56,8 +60,13 @@ def noises(asked: Robustness, spacing: float) -> list[Noise]:
         ),
     ]
     if (both := asked.together) is not None:
-        name = f"together {both.geometry:g} mm, {100 * both.stiffness:g} %"
-        found.append(Noise(name, Perturbation(geometry=both.geometry, ligaments=both.stiffness)))
+        length, share = f"{both.geometry:g} mm", f"{100 * both.stiffness:g} %"
+        of_both = Perturbation(geometry=both.geometry, ligaments=both.stiffness)
+        found.append(Noise(f"together {length}, {share}", of_both))
+        found.append(Noise(f"vertices {length}", Perturbation(geometry=both.geometry)))
+        if both.stiffness not in asked.stiffness:
+            found.append(Noise(f"stiffness {share}", Perturbation(ligaments=both.stiffness)))
+        found.append(Noise(f"common {share}", Perturbation(stiffness=both.stiffness)))
     return found
 
 

@@ -7,6 +7,7 @@ import xarray as xr
 
 from pipeline import datasets
 from pipeline.posing.structure_variables import flat_vertices
+from pipeline.posing.to_scene import lattice_of
 from pipeline.problem import Problem
 from pipeline.runtime import UserError
 from sim.core import Floats
@@ -44,7 +45,7 @@ def start_vector(asked: Problem, scene: Scene, path: Path | None, source: Path) 
         return None
     design = datasets.read(path, "design")
     vector, space = shipped_vector(design), scene.space
-    if len(vector) == space.n_variables and design["vertices"].shape[0] == scene.lattice.n_units:
+    if len(vector) == space.n_variables and design.sizes["unit"] == lattice_of(asked).n_units:
         there = flat_vertices(scene.lattice, design["vertices"])
         if np.abs(np.asarray(space.vertices(vector)) - there).max() < _SAME:
             return vector

@@ -1,5 +1,6 @@
 from . import checks as checks
 from . import claims as claims
+from . import copies as copies
 from . import fact_records as fact_records
 from . import foil as foil
 from . import measures as measures

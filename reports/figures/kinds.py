@@ -25,7 +25,8 @@ class ReportKind:
 
 
 def _wave_text(study: StudyResults, caption: str, facts: Sequence[Fact]) -> PageText:
-    headline = ("error_altered", "error_cloaked", "error_reduction", "loss_reduction")
+    gains = ("error_reduction", "loss_reduction")
+    headline = ("error_altered", "error_cloaked", *gains, "loss_end", "loss_copies")
     paper = study.problem.report.paper
     return study_text(study, caption, facts, credit=loading_path.credit(paper), headline=headline)
 

@@ -9,6 +9,7 @@ from typing import get_args
 from pipeline.problem import Output
 from reports.facts import ABSENT, Fact, fact_records, grouped
 from reports.figures import kinds
+from reports.figures.robust_table import robust_table
 from reports.page import Report, publish, study_page
 from reports.study import StudyResults, study_results
 
@@ -23,7 +24,8 @@ def study_report(study: StudyResults) -> Report:
     figure = kind.figure(study)
     text = kind.text(study, figure.caption, facts)
     built = as_built_facts(study, kind, text.headline)
-    text = replace(text, built={fact.key.removeprefix(BUILT): fact.ours for fact in built})
+    words = {fact.key.removeprefix(BUILT): fact.ours for fact in built}
+    text = replace(text, built=words, robust=robust_table(study))
     facts += built
     return study_page(
         study.name,

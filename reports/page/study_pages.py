@@ -25,13 +25,14 @@ LARGEST_PAGE = 6_000_000
 
 @dataclass(frozen=True)
 class RobustTable:
-    """Holds a measure of the cloak as designed and of imperfect copies, in words.
+    """Holds measures of the cloak as designed and of imperfect copies, in words.
 
-    `rows` are the specimens, the middle of their values and the value that 95 % of them keep to.
+    `rows` are the specimens, and of each measure the middle of their values and the value that 95 %
+    of them keep to.
     """
 
-    measure: str
-    rows: Sequence[tuple[str, str, str]]
+    measures: Sequence[str]
+    rows: Sequence[tuple[str, Sequence[tuple[str, str]]]]
 
 
 @dataclass(frozen=True)
@@ -63,14 +64,13 @@ def study_text(
     headline: Sequence[str],
     figure_title: str = "Figure",
     note: str = "",
-    robust: RobustTable | None = None,
 ) -> PageText:
     """Returns the text of one study; `headline` are keys of facts, as far as there are such."""
     by_key = {fact.key: fact for fact in facts}
     title = study.problem.title or study.name
     shown = [by_key[key] for key in headline if key in by_key]
     lead = study.problem.doc.strip()
-    return PageText(title, lead, credit, figure_title, caption, shown, note, robust)
+    return PageText(title, lead, credit, figure_title, caption, shown, note)
 
 
 Source = tuple[str, list[tuple[str, str]]]

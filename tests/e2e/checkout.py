@@ -30,6 +30,7 @@ solver: { accuracy: draft }
 response: { cycles: 1, samples: 21 }
 sweep: { grid: { drive.directions: { points: 3 }, drive.frequency: { points: 2 } } }
 report: { measured_constants: null, as_built: false }
+robustness: null
 presets: {}
 """)
 ROOMS = ("benchmarks", "experiments", "metacloak", "pipeline", "profiles", "reports", "sim")

@@ -187,7 +187,7 @@ def _motion(chosen: Problem, lattice: Lattice, time: np.ndarray, name: str) -> n
 def scatter(chosen: Problem) -> xr.Dataset:
     assert chosen.robustness is not None
     kinds = noises(chosen.robustness, 15.0)
-    size, steps = (len(kinds), chosen.robustness.samples), chosen.horizon.steps or 0
+    size, steps = (len(kinds), chosen.robustness.samples), chosen.horizon.steps or 1
     time = np.arange(1, steps + 1) / steps
     reach = 0.01 * (1 + np.arange(size[1]) + np.arange(size[0])[:, None])
     status = np.full(size, "ok", dtype=object)

@@ -19,6 +19,7 @@ from pipeline.stages import sweep as sweep_stage
 from reports.study import StudyResults, study_results
 from sim.structure import Lattice
 from tests.pipeline.samples import filled
+from tests.reports import compressed_study
 
 PROBLEM = Path(__file__).parents[2] / "experiments" / "fig2" / "problem.yaml"
 
@@ -48,6 +49,10 @@ def written(folder: Path, preset: str | None = None) -> StudyResults:
         files["constants"] = folder / "constants.nc"
         about = provenance.of_study(posed, "sweep")
         datasets.write(constants(posed), files["constants"], "sweep", about)
+    if chosen.robustness is not None:
+        files["scatter"] = folder / "scatter.nc"
+        about = provenance.of_study(chosen, "monte_carlo")
+        datasets.write(compressed_study.scatter(chosen), files["scatter"], "scatter", about)
     if chosen.report.as_built:
         files["built"] = folder / "built.nc"
         about = provenance.of_study(chosen, "as_built", plan={})

@@ -15,7 +15,7 @@ from tests.workflow.conftest import Sandbox
 
 STUDY = {"design": 2, "select": 1, "simulate": 1, "as_built": 1, "sweep": 4, "sweep_gather": 1}
 STUDY |= {"sweep_constants": 1, "virtual_specimen": 2, "film_render": 2, "track": 2, "compare": 2}
-STUDY |= {"report": 1, "fig2": 1}
+STUDY |= {"monte_carlo": 2, "monte_carlo_gather": 1, "report": 1, "fig2": 1}
 
 
 def only(*rules: str) -> dict[str, int]:

@@ -10,10 +10,12 @@ from pipeline.problem.fields import Coordinate, Count, Delay, Gap, Positive, Rat
 class WorkshopTolerance(Section):
     """Imperfections that copies have all at once: those of a printer and its shims.
 
+    Other copies have each of them alone, and others again a factor of each of the three stiffnesses
+    that is common to all ligaments, which scatters as much.
+
     Attributes:
         geometry: largest shift of a vertex along x and y, either way and evenly spread.
-        stiffness: standard deviation of each of every ligament's stiffnesses, as a share of it. A
-            factor common to all ligaments leaves equilibria as they are.
+        stiffness: standard deviation of each of every ligament's stiffnesses, as a share of it.
     """
 
     geometry: Gap = 0.1

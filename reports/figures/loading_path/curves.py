@@ -9,7 +9,7 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from pipeline.problem import Problem
 from reports.base import style
-from reports.facts import JUMPED
+from reports.facts import JUMPED, copies
 from reports.figures.loading_path import measured, measures, monte_carlo
 from reports.figures.loading_path.abscissa import (
     SECOND,
@@ -31,6 +31,8 @@ CASE_STYLES = (
     ((0, (5.0, 1.2, 1.2, 1.2)), 0.55),
 )
 """Dashes and share of white of the curves of one load case after the other."""
+DRAWN = ("geometry", "stiffness", "together")
+"""First words of the noises that there are bands of."""
 RIGHT_AXIS = 9.0
 """Room for the labels of an axis on the right, mm."""
 
@@ -134,22 +136,29 @@ def _jumps(axes: Axes, path: Abscissa, values: xr.DataArray, response: xr.Datase
 
 
 def _bands(
-    axes: Axes, study: StudyResults, path: Abscissa, measure: Measure, copies: xr.Dataset
+    axes: Axes, study: StudyResults, path: Abscissa, measure: Measure, made: xr.Dataset
 ) -> None:
     """Draws the 5 % to 95 % percentiles of every kind of noise, laid over one another."""
-    along = np.interp([0.0, *copies["time"].values], study.response["time"], path.values)
-    values = monte_carlo.copy_curves(study.problem, measure, study.response, copies)
-    for noise in copies["noise"].values:
+    made = made.sel(noise=_drawn(made))
+    along = np.interp([0.0, *made["time"].values], study.response["time"], path.values)
+    values = monte_carlo.copy_curves(study.problem, measure, study.response, made)
+    for noise in made["noise"].values:
         low, high = np.nanpercentile(values.sel(noise=noise), BAND, axis=0)
         low, high = np.insert(low, 0, 0.0), np.insert(high, 0, 0.0)  # all start from rest
         axes.fill_between(along, low, high, color=style.CLOAKED, alpha=0.18, lw=0, zorder=2)
 
 
-def robustness_panel(axes: Axes, study: StudyResults, measure: Measure, copies: xr.Dataset) -> None:
-    """Draws the measure of path or motion: median and percentiles of every kind of noise."""
+def _drawn(made: xr.Dataset) -> list[str]:
+    """Lists the noises that are drawn; others stand in the table alone."""
+    return [str(name) for name in made["noise"].values if str(name).split()[0] in DRAWN]
+
+
+def robustness_panel(axes: Axes, study: StudyResults, measure: Measure, made: xr.Dataset) -> None:
+    """Draws the measure of path or motion: median and percentiles of kinds of noise."""
+    made = made.sel(noise=_drawn(made))
     ends = measures.overall(study.problem, over_cases(study.problem, measure.of(study.response)))
-    values = monte_carlo.copy_curves(study.problem, measure, study.response, copies)
-    found = monte_carlo.spreads(measures.overall(study.problem, values), copies)
+    values = monte_carlo.copy_curves(study.problem, measure, study.response, made)
+    found = copies.spreads(measures.overall(study.problem, values), made)
     for row, spread in enumerate(found):
         axes.plot([spread.low, spread.high], [row, row], color=style.CLOAKED, lw=3.0, alpha=0.45)
         axes.plot(spread.middle, row, "o", ms=3.6, mfc="white", mec=style.CLOAKED, mew=1.0)

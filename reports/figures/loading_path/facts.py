@@ -3,8 +3,7 @@
 A publication's words for them stand in the problem, under `report.paper.values`, by their key.
 """
 
-import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import xarray as xr
@@ -13,10 +12,10 @@ from pipeline.comparison import middle_units
 from pipeline.problem import Problem
 from pipeline.problem.sections import HarmonicDrive, Quads, RampHarmonicDrive, Region
 from reports.facts import (
-    ABSENT,
     Fact,
     checks,
     constants_facts,
+    copies,
     facts_of,
     grouped,
     recording_facts,
@@ -33,7 +32,6 @@ from reports.figures.loading_path.abscissa import (
     structures,
 )
 from reports.figures.loading_path.curves import over_cases
-from reports.page import RobustTable
 from reports.study import StudyResults, display_name, from_dataset
 from sim.core import Floats
 
@@ -56,7 +54,7 @@ def loading_path_facts(study: StudyResults) -> list[Fact]:
         *grouped("Checks along the path", checks.path_facts(study.problem, study.response)),
         *grouped("Contact", contact_comparison.contact_facts(study)),
         *grouped("Load steps", checks.variant_facts(study.verification)),
-        *grouped("Imperfect copies", [*worst_copy_fact(study), *robustness_facts(study)]),
+        *grouped("Imperfect copies", copy_facts(study)),
         *grouped(
             "With the constants’ measured spread",
             constants_facts(study.problem, study.constants, mean_losses(study)),
@@ -282,64 +280,13 @@ def reaction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
         yield from _each(study, "reaction_error", off)
 
 
-def _spreads_of_copies(study: StudyResults) -> Sequence[monte_carlo.Spread]:
-    """Spreads the measure over the imperfect copies, if there are any."""
-    copies = study.scatter
-    if copies is None:
-        return ()
+def copy_facts(study: StudyResults) -> Iterator[Fact]:
+    """Yields what 95 % of the imperfect copies keep to, and the spread of the measure."""
+    if study.scatter is None:
+        return
     measure = measures.measure_of(study.problem)
-    values = monte_carlo.copy_curves(study.problem, measure, study.response, copies)
-    return monte_carlo.spreads(measures.overall(study.problem, values), copies)
-
-
-def robustness_facts(study: StudyResults) -> Iterator[Fact]:
-    """Yields spread of the measure over the imperfect copies."""
-    measure = measures.measure_of(study.problem)
-    for spread in _spreads_of_copies(study):
-        key = re.sub(r"\W+", "_", spread.noise).strip("_")
-        of = {"what": measure.label, "noise": _in_words(spread.noise), "unit": measure.unit}
-        yield _told("copies_{key}", spread.middle, key=key, spread=spread, **of)
-
-
-def robust_table(study: StudyResults) -> RobustTable | None:
-    """Lists the measure of the cloak as designed, built, and of copies."""
-    spreads = _spreads_of_copies(study)
-    if not spreads:
-        return None
-    measure = measures.measure_of(study.problem)
-    rows = []
-    for name, each in (("as designed", study), ("as built", study.as_built)):
-        if each is not None:
-            curves = over_cases(each.problem, measure.of(each.response))
-            whole = measures.overall(each.problem, curves)
-            nominal = worded(float(whole.sel(structure="cloaked")), measure.unit, 3)
-            rows.append((name, nominal, ABSENT))
-    for spread in spreads:
-        failed = f", {spread.failed} failed" if spread.failed else ""
-        name = f"{_in_words(spread.noise)} ({spread.count} copies{failed})"
-        middle, high = (worded(x, measure.unit, 3) for x in (spread.middle, spread.high))
-        rows.append((name, middle, high))
-    return RobustTable(measure.label, rows)
-
-
-def worst_copy_fact(study: StudyResults) -> Iterator[Fact]:
-    """Yields the value that 95 % of the copies keep to, with all imperfections at once.
-
-    Where these were not tried together, under the most harmful one.
-    """
-    measure = measures.measure_of(study.problem)
-    found = [each for each in _spreads_of_copies(study) if np.isfinite(each.high)]
-    if found:
-        worst = max(found, key=lambda each: (each.noise.startswith("together"), each.high))
-        of = {"key": measure.key, "what": measure.label, "unit": measure.unit}
-        yield _told("{key}_cloaked_copies", worst.high, note=_in_words(worst.noise), **of)
-
-
-def _in_words(noise: str) -> str:
-    kind, _, size = noise.partition(" ")
-    if kind == "together":
-        shift, _, scatter = size.partition(", ")
-        return f"vertices off by up to ±{shift} and stiffnesses with {scatter} standard deviation"
-    if kind == "geometry":
-        return f"vertices off by up to ±{size} of s"
-    return f"stiffnesses with {size} standard deviation"
+    values = monte_carlo.copy_curves(study.problem, measure, study.response, study.scatter)
+    found = copies.spreads(measures.overall(study.problem, values), study.scatter)
+    key = f"{measure.key}_cloaked"
+    yield from copies.worst_copy_fact(key, measure.label, measure.unit, found)
+    yield from copies.spread_facts(measure.label, measure.unit, found)

@@ -17,7 +17,6 @@ from reports.figures.loading_path.abscissa import (
     lattice_size,
     structures,
 )
-from reports.figures.loading_path.facts import robust_table
 from reports.figures.loading_path.snapshot_grid import SnapshotLayout, snapshots
 from reports.figures.loading_path.structure_panels import rest_panel, shade_of
 from reports.page import PageText, study_text
@@ -205,7 +204,6 @@ def loading_path_text(study: StudyResults, caption: str, facts: Sequence[Fact]) 
         facts,
         credit=credit(study.problem.report.paper),
         headline=(f"{key}_reduction", *measured, "loss_reduction", "snaps"),
-        robust=robust_table(study),
     )
 
 

@@ -16,6 +16,7 @@ from reports.facts import (
     Fact,
     checks,
     constants_facts,
+    copies,
     facts_of,
     foil,
     grouped,
@@ -56,6 +57,7 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
         *grouped("Measured motion of the same unit", recorded_facts(study)),
         *recording_facts.recorded_facts(study.recordings),
         *grouped("Robustness", map_facts(frequency_map(study.sweep))),
+        *grouped("Imperfect copies", copies.loss_facts(study)),
         *grouped(
             "With the constants’ measured spread",
             constants_facts(study.problem, study.constants, mean_losses(scene, response)),

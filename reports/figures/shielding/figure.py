@@ -116,7 +116,7 @@ def shielding_text(study: StudyResults, caption: str, facts: Sequence[Fact]) -> 
         caption,
         facts,
         credit=_PROSE["credit"],
-        headline=("mean_reduction", "loss_end", "peak_to_peak_reduction", "map_max"),
+        headline=("mean_reduction", "loss_end", "loss_copies", "peak_to_peak_reduction", "map_max"),
         note="The dot marks the unit of panel d.",
     )
 

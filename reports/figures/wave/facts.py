@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem.sections import RampHarmonicDrive
-from reports.facts import Fact, checks, facts_of, grouped, within, worded
+from reports.facts import Fact, checks, copies, facts_of, grouped, within, worded
 from reports.figures.loading_path import (
     abscissa_of,
     loss_facts,
@@ -34,6 +34,7 @@ def wave_facts(study: StudyResults) -> list[Fact]:
         *grouped("Contact on the edges", edge_facts(study)),
         *grouped("Time steps", step_facts(study.verification)),
         *grouped("Optimisation", checks.history_facts(study.problem, study.design)),
+        *grouped("Imperfect copies", copies.loss_facts(study)),
         *grouped("Checks of the design", checks.design_facts(study.design)),
         *grouped("Checks over time", checks.path_facts(study.problem, study.response)),
     ]

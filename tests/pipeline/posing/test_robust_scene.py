@@ -114,10 +114,16 @@ def test_a_pulse_is_a_load_of_its_own(fig2: Path) -> None:
     assert largest == pytest.approx(4.5)
 
 
-def test_a_preset_starts_from_the_design_of_the_study(fig2: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("void", [None, {"disc": {"centre": ["30 mm", "58 mm"], "radius": "8 mm"}}])
+def test_a_preset_starts_from_the_design_of_the_study(
+    fig2: Path, tmp_path: Path, void: dict[str, object] | None
+) -> None:
     content = yaml.safe_load(fig2.read_text())
     presets, again = content["presets"], {"optimiser": {"start": "study"}}
     presets["quick"] = overlay_keys(presets["quick"], SMALLER)
+    if void is not None:
+        holed = {"void": void, "optimiser": {"symmetry": "none"}}
+        presets["quick"] = overlay_keys(presets["quick"], holed)
     presets["again"] = overlay_keys(deepcopy(presets["quick"]), again)
     path = tmp_path / "problem.yaml"
     path.write_text(yaml.safe_dump(content))

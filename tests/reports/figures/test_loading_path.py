@@ -15,10 +15,12 @@ from pipeline.problem import Output
 from pipeline.problem.sections import Paper, RotationDrive, TimeSeriesDrive
 from reports.base import style
 from reports.facts import checks, fact_records
+from reports.facts.copies import spreads
 from reports.figures import kinds
 from reports.figures.loading_path import abscissa, figure, measures, monte_carlo
 from reports.figures.loading_path import facts as path_facts
 from reports.figures.loading_path.structure_panels import rest_panel
+from reports.figures.robust_table import robust_table
 from reports.figures.shielding import facts as shielding
 from reports.figures.study_report import as_built_facts, study_report
 from reports.page import publish
@@ -116,7 +118,7 @@ def test_copies_are_measured_like_the_structure(shield: StudyResults, smile: Stu
 def test_failed_copies_are_counted_and_left_out(shield: StudyResults) -> None:
     copies = shield.scatter
     assert copies is not None
-    second = monte_carlo.spreads(copies["loss"], copies)[1]
+    second = spreads(copies["loss"], copies)[1]
     good = np.array([0.02, 0.03, 0.05, 0.06])
     assert (second.count, second.failed, second.clashing) == (4, 1, 2)
     assert second.middle == pytest.approx(np.median(good))
@@ -125,12 +127,21 @@ def test_failed_copies_are_counted_and_left_out(shield: StudyResults) -> None:
 
 
 def test_the_copies_stand_in_a_table_of_their_own(shield: StudyResults) -> None:
-    table = path_facts.robust_table(shield)
+    table = robust_table(shield)
     assert table is not None
     assert table.rows[0][0] == "as designed"
-    assert table.rows[0][1] == values(shield)["rotation_cloaked"].ours
+    known = values(shield)
+    assert table.rows[0][1][0][0] == known["rotation_cloaked"].ours
+    assert table.rows[0][1][1][0] == known["loss_end"].ours
     worst = values(shield)["rotation_cloaked_copies"]
-    assert worst.ours in {high for _, _, high in table.rows[1:]}
+    assert worst.ours in {high for _, ((_, high), _) in table.rows[1:]}
+    assert [name.partition(" with")[0].partition(" off")[0] for name, _ in table.rows[1:]] == [
+        "vertices",
+        "stiffnesses",
+        "vertices",
+        "each stiffness of all ligaments alike",
+        *["vertices"] * 2,
+    ]
     assert worst.value > values(shield)["rotation_cloaked"].value
 
 
@@ -143,9 +154,10 @@ def test_the_headline_is_told_as_built_too(shield: StudyResults) -> None:
     assert (fact.key, fact.group) == ("built_rotation_cloaked", "As built")
     assert fact.value == pytest.approx(1.5 * known["rotation_cloaked"].value)
     assert as_built_facts(shield, kinds.LOADING_PATH, headline) == []
-    table = path_facts.robust_table(study)
+    table = robust_table(study)
     assert table is not None
-    assert table.rows[1] == ("as built", fact.ours, fact_records.ABSENT)
+    assert table.rows[1][0] == "as built"
+    assert table.rows[1][1][0] == (fact.ours, fact_records.ABSENT)
 
 
 def test_a_paper_is_quoted_by_the_keys_of_the_facts(
