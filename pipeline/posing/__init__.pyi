@@ -12,8 +12,11 @@ from .case_result import measure as measure
 from .case_result import structures_of as structures_of
 from .case_result import times_of as times_of
 from .dispersion import compute_bands as compute_bands
+from .first_look import SOFT as SOFT
+from .first_look import compliance_shares as compliance_shares
 from .first_look import cost_line as cost_line
 from .first_look import doubts as doubts
+from .first_look import soft_units as soft_units
 from .perturbed import drawn as drawn
 from .response_dataset import assemble_response as assemble_response
 from .response_dataset import case_directions as case_directions

@@ -10,6 +10,7 @@ from typing import Any
 import xarray as xr
 from matplotlib.figure import Figure
 
+from pipeline.posing import altered_lattice_of, flat_vertices, soft_units
 from pipeline.problem import Problem, canonical_json, content_hash
 from reports.base import Table
 from reports.facts import ABSENT, Fact, claims, foil, worded
@@ -167,7 +168,9 @@ def _warnings(study: StudyResults) -> list[str]:
     told = [study.response] if study.as_built is None else [study.response, study.as_built.response]
     plans = [plan for each in told for plan in json.loads(each.attrs["plan"]).values()]
     said = list(dict.fromkeys(text for plan in plans for text in plan.get("warnings", ())))
-    return [*said, *foil.strain_warning(study.problem, study.response)]
+    lattice, cloaked = altered_lattice_of(study.problem), study.response.sel(structure="cloaked")
+    soft = soft_units(study.problem, lattice, flat_vertices(lattice, cloaked["vertices"]))
+    return [*said, *foil.strain_warning(study.problem, study.response), *soft]
 
 
 def sources(study: StudyResults, label: str = "") -> Iterator[Source]:

@@ -155,7 +155,9 @@ class Evaluator:
         solver, cases = self.plan.solver, self._cases
         if self.scene.design.copies is None:
             return self._chains[0](design, solver=solver, cases=cases, memory=self._memory)
-        memory = None if self._memory is None else _PartedMemory(self._memory, len(cases))
+        memory = None
+        if self._memory is not None and isinstance(solver, StaticSolver):
+            memory = _PartedMemory(self._memory, len(cases))
         found = [chain(design, solver=solver, cases=cases, memory=memory) for chain in self._chains]
         if memory is not None:
             memory.close(design)
@@ -190,9 +192,8 @@ class _PartedMemory:
         self._after += records
 
     def close(self, design: Floats) -> None:
-        """Hands the records on, if there are any: motions in time have none."""
-        if self._after:
-            self._whole.keep(design, self._after)
+        """Hands on the records of all copies."""
+        self._whole.keep(design, self._after)
 
 
 _evaluator = lru_cache(maxsize=4)(Evaluator)

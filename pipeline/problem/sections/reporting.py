@@ -4,7 +4,17 @@ from typing import Annotated
 
 from pydantic import Field
 
-from pipeline.problem.fields import Coordinate, Count, Delay, Gap, Positive, Ratio, Samples, Section
+from pipeline.problem.fields import (
+    Coordinate,
+    Count,
+    Delay,
+    Gap,
+    Modulus,
+    Positive,
+    Ratio,
+    Samples,
+    Section,
+)
 
 
 class WorkshopTolerance(Section):
@@ -79,6 +89,8 @@ class ReportOptions(Section):
         places: the units nearest to these are followed over time, at most three.
         shim_strain_limit: the strain up to which the foil of the shims counts as sound (polyester
             yields at about 5 %).
+        unit_modulus: Young's modulus of the units, which count as rigid; the page and `check` warn
+            of such as are soft against their ligaments. Their height is `fabrication.thickness`.
         as_built: whether it also tells what the structures do with their shims bent as the slots of
             `fabrication` are drawn.
         measured_constants: constants over which the losses are shown as well.
@@ -89,6 +101,7 @@ class ReportOptions(Section):
     instants: tuple[Delay, ...] = ()
     places: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(max_length=3)] = ()
     shim_strain_limit: Positive = 0.05
+    unit_modulus: Modulus = 2000.0
     as_built: bool = False
     measured_constants: MeasuredConstants | None = None
     paper: Paper | None = None

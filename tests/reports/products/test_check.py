@@ -56,6 +56,14 @@ def test_the_cost_grows_as_the_factor_does(tmp_path: Path) -> None:
     assert "min on one core" not in cost_line(load(path), scene)
 
 
+def test_units_too_soft_to_be_rigid_are_doubted(tmp_path: Path) -> None:
+    path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
+    assert doubted(path) == []
+    path.write_text(path.read_text() + "\nreport: { unit_modulus: 20 MPa }\n")
+    (told,) = doubted(path)
+    assert "soft against their ligaments, though they count as rigid: 24" in told
+
+
 def drawn(folder: Path, draw: Callable[[ImageDraw.ImageDraw], object]) -> Path:
     picture = Image.new("L", (200, 200), 255)
     draw(ImageDraw.Draw(picture))
