@@ -32,7 +32,7 @@ from tests.tables import cases, refused
 ROBUST = (
     "broadband", "worst", "amplitudes", "tolerant", "pulse", "unbiased", "unbiased_as_built",
 )  # fmt: skip
-NAMES = ("edge3", "free", "text", *ROBUST, "as_built", "quick")
+NAMES = ("edge3", "free", "text", *ROBUST, "as_built", "robust", "quick")
 PRESETS = (None, *NAMES)
 
 
