@@ -19,15 +19,10 @@ class NetworkArrays(NamedTuple):
 
 
 class Kinematics(NamedTuple):
-    """Holds what the derivatives of the energy share at one state of a network.
+    """Holds what the derivatives of the energy share at one state of a network."""
 
-    Attributes:
-        turn: (n_units, 4) cos and sin of all rotations, then of their halves.
-        shear: (n_ligaments,) shear angles, from their natural values, rad.
-    """
-
-    turn: Floats
-    shear: Floats
+    turn: Floats  # (n_units, 4) cos and sin of all rotations, then of their halves
+    shear: Floats  # (n_ligaments,) shear angles, from their natural values, rad
 
 
 class Sensitivity(NamedTuple):

@@ -35,19 +35,12 @@ RESTARTS = 3
 
 @dataclass(frozen=True)
 class FamilyOptions:
-    """Holds how the worst loss over a family is minimised.
+    """Holds how the worst loss over a family is minimised."""
 
-    Attributes:
-        sharpness: p of the p-mean of the losses under the loads in the set.
-        nominal: share of the mean loss under the drive's own loads in what is minimised.
-        evaluations: of the set's losses between two searches, at most.
-        search: of the worst load.
-    """
-
-    sharpness: float = 16.0
-    nominal: float = 0.0
-    evaluations: int = 16
-    search: SearchOptions = field(default_factory=SearchOptions)
+    sharpness: float = 16.0  # p of the p-mean of the losses under the loads in the set
+    nominal: float = 0.0  # share of the mean loss under the drive's own loads in what is minimised
+    evaluations: int = 16  # of the set's losses between two searches, at most
+    search: SearchOptions = field(default_factory=SearchOptions)  # of the worst load
 
 
 class _Search:

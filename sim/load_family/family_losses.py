@@ -96,17 +96,11 @@ class LoadFamily:
 
 
 class LoadLoss(NamedTuple):
-    """Holds the loss under a load, and its derivatives.
+    """Holds the loss under a load, and its derivatives."""
 
-    Attributes:
-        value: the loss, relative to the size of the load.
-        by_design: (n_variables,) per mm.
-        by_place: (n,) along the axes of the unit cube.
-    """
-
-    value: float
-    by_design: Floats
-    by_place: Floats
+    value: float  # the loss, relative to the size of the load
+    by_design: Floats  # (n_variables,) per mm
+    by_place: Floats  # (n,) along the axes of the unit cube
 
 
 class LoadLosses:

@@ -17,34 +17,21 @@ APART = 0.02
 
 @dataclass(frozen=True)
 class SearchOptions:
-    """Holds how the worst load is searched.
+    """Holds how the worst load is searched."""
 
-    Attributes:
-        samples: loads spread over the family, of which the losses alone are computed.
-        ascents: searches by the gradient, from the worst of these ...
-        evaluations: ... of so many losses with their gradient each, at most.
-        seed: of the samples.
-    """
-
-    samples: int = 16
-    ascents: int = 3
-    evaluations: int = 8
-    seed: int = 0
+    samples: int = 16  # loads spread over the family, of which the losses alone are computed
+    ascents: int = 3  # searches by the gradient, from the worst of these
+    evaluations: int = 8  # ... of so many losses with their gradient each, at most.
+    seed: int = 0  # of the samples
 
 
 @dataclass(frozen=True)
 class FoundLoad:
-    """Holds a load that a search ended at.
+    """Holds a load that a search ended at."""
 
-    Attributes:
-        place: (n,) in the family.
-        loss: there.
-        start: (n,) where the search started.
-    """
-
-    place: Floats
-    loss: float
-    start: Floats
+    place: Floats  # (n,) in the family
+    loss: float  # there
+    start: Floats  # (n,) where the search started
 
 
 def spread_places(family: LoadFamily, count: int, seed: int) -> Floats:

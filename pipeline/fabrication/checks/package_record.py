@@ -50,21 +50,13 @@ def expected_parts(design: xr.Dataset, structure: str) -> ExpectedParts:
 
 @dataclass(frozen=True)
 class PackageRecord:
-    """Holds a package's folder beside the parts expected of it.
+    """Holds a package's folder beside the parts expected of it."""
 
-    Attributes:
-        folder: to be checked.
-        expected: units and ligaments that have to be there.
-        shapes: outlines of the units in the assembled specimen.
-        settings: of the fabrication.
-        letters: carried by small units instead of their ids, by id.
-    """
-
-    folder: Path
-    expected: ExpectedParts
-    shapes: Shapes
-    settings: Fabrication
-    letters: Mapping[str, str]
+    folder: Path  # to be checked
+    expected: ExpectedParts  # units and ligaments that have to be there
+    shapes: Shapes  # outlines of the units in the assembled specimen
+    settings: Fabrication  # of the fabrication
+    letters: Mapping[str, str]  # carried by small units instead of their ids, by id
 
     @cached_property
     def drawings(self) -> dict[tuple[str, str], list[Drawing]]:

@@ -26,25 +26,15 @@ _FAR, _BACK, _HAIR = 50.0, 0.01, 2e-4  # mm
 
 @dataclass(frozen=True)
 class MeasuredSlot:
-    """Holds the measures of a slot in an outline.
+    """Holds the measures of a slot in an outline."""
 
-    Attributes:
-        vertex: the nearest vertex of the design.
-        shape: the slot, from its mouth to its inner end.
-        inner: its inner end, across.
-        depth: from the vertex to the inner end, mm.
-        width: mm.
-        wall: thinnest wall around the inner end, mm.
-        lip: thinnest wall beside the mouth, mm.
-    """
-
-    vertex: int
-    shape: Geometry
-    inner: LineString
-    depth: float
-    width: float
-    wall: float
-    lip: float
+    vertex: int  # the nearest vertex of the design
+    shape: Geometry  # the slot, from its mouth to its inner end
+    inner: LineString  # its inner end, across
+    depth: float  # from the vertex to the inner end, mm
+    width: float  # mm
+    wall: float  # thinnest wall around the inner end, mm
+    lip: float  # thinnest wall beside the mouth, mm
 
 
 def measured_slots(design: Polygon, made: Polygon, width: float) -> list[MeasuredSlot]:
@@ -132,21 +122,13 @@ def _unit(vector: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class UnitSection:
-    """Holds a unit as a file has it, beside its design.
+    """Holds a unit as a file has it, beside its design."""
 
-    Attributes:
-        label: id of the unit.
-        file: with the unit.
-        design: the polygon as designed.
-        made: the outline in the file, in the design's frame.
-        ligaments: vertices at which a ligament ends, one entry a ligament.
-    """
-
-    label: str
-    file: Path
-    design: Polygon
-    made: Geometry
-    ligaments: Sequence[int]
+    label: str  # id of the unit
+    file: Path  # with the unit
+    design: Polygon  # the polygon as designed
+    made: Geometry  # the outline in the file, in the design's frame
+    ligaments: Sequence[int]  # vertices at which a ligament ends, one entry a ligament
 
     def fault(self, what: str, key: str, remedy: str, spot: Geometry) -> Fault:
         """Makes a fault of the unit at a spot."""

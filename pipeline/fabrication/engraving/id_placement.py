@@ -40,19 +40,12 @@ _ARROW = ("00 23 40", "20 23")  # on a grid of 4 by 3
 
 
 class PlacedId(NamedTuple):
-    """Strokes of an id with the box that they fill.
+    """Strokes of an id with the box that they fill."""
 
-    Attributes:
-        strokes: as read from the top.
-        mirrored: the same, to be read from below, seen from the top.
-        box: their bounding box, turned with them.
-        kept: share of the strokes that lies on the part, on the side where it is less.
-    """
-
-    strokes: Strokes
-    mirrored: Strokes
-    box: BaseGeometry
-    kept: float
+    strokes: Strokes  # as read from the top
+    mirrored: Strokes  # the same, to be read from below, seen from the top
+    box: BaseGeometry  # their bounding box, turned with them
+    kept: float  # share of the strokes that lies on the part, on the side where it is less
 
 
 def place_id(words: str, outline: Polygon, body: Polygon, settings: Labels) -> PlacedId | None:

@@ -37,20 +37,13 @@ _COVERED = 100.0  # mm^-2 for what must not be covered
 
 @dataclass(frozen=True)
 class Tile:
-    """Holds one page's part of the drawing.
+    """Holds one page's part of the drawing."""
 
-    Attributes:
-        name: row letter from the top and column number, "B2".
-        window: its part, in the drawing's coordinates.
-        row, column: from the top left, from zero.
-        of: rows and columns of pages.
-    """
-
-    name: str
-    window: Box
-    row: int
-    column: int
-    of: tuple[int, int]
+    name: str  # row letter from the top and column number, "B2"
+    window: Box  # its part, in the drawing's coordinates
+    row: int  # from the top left, from zero
+    column: int  # likewise
+    of: tuple[int, int]  # rows and columns of pages
 
     def joints(self) -> Iterator[tuple[str, float]]:
         """Yields the middle lines of the strips shared with other pages: ("x" or "y", position)."""

@@ -39,15 +39,10 @@ class Layer(NamedTuple):
 
 
 class Mesh(NamedTuple):
-    """Holds a closed surface.
+    """Holds a closed surface."""
 
-    Attributes:
-        vertices: (n, 3) mm.
-        faces: (m, 3) indices, counter-clockwise from outside.
-    """
-
-    vertices: Floats
-    faces: Ints
+    vertices: Floats  # (n, 3) mm
+    faces: Ints  # (m, 3) indices, counter-clockwise from outside
 
     def moved(self, x: float, y: float) -> Mesh:
         """Shifts the mesh on the bed."""
@@ -56,15 +51,10 @@ class Mesh(NamedTuple):
 
 @dataclass(frozen=True)
 class PrintedPart:
-    """Holds a printed part, as it lies on the bed.
+    """Holds a printed part, as it lies on the bed."""
 
-    Attributes:
-        id: unique in the package; the name of its files and objects.
-        layers: from the bed (z = 0) upwards; they do not overlap.
-    """
-
-    id: str
-    layers: tuple[Layer, ...]
+    id: str  # unique in the package; the name of its files and objects
+    layers: tuple[Layer, ...]  # from the bed (z = 0) upwards; they do not overlap
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:

@@ -68,25 +68,15 @@ class Circle:
 
 @dataclass(frozen=True)
 class FlatPart:
-    """Holds a flat part: one outline that is cut, round holes, strokes that are engraved.
+    """Holds a flat part: one outline that is cut, round holes, strokes that are engraved."""
 
-    Attributes:
-        id: unique in the package; the name of its files and objects.
-        outline: the outer loop, without holes, at nominal size.
-        height: thickness of the sheet or of the printed part.
-        holes: inside the outline.
-        engraving: lettering and orientation mark, to be read from the top.
-        scores: lines to fold or to mark along.
-        tabs: where the outline is not cut, so that its sheet holds the part.
-    """
-
-    id: str
-    outline: Polygon
-    height: float
-    holes: tuple[Circle, ...] = ()
-    engraving: Strokes = ()
-    scores: Strokes = ()
-    tabs: tuple[Circle, ...] = ()
+    id: str  # unique in the package; the name of its files and objects
+    outline: Polygon  # the outer loop, without holes, at nominal size
+    height: float  # thickness of the sheet or of the printed part
+    holes: tuple[Circle, ...] = ()  # inside the outline
+    engraving: Strokes = ()  # lettering and orientation mark, to be read from the top
+    scores: Strokes = ()  # lines to fold or to mark along
+    tabs: tuple[Circle, ...] = ()  # where the outline is not cut, so that its sheet holds the part
 
     @property
     def cuts(self) -> list[Floats]:
@@ -128,27 +118,16 @@ class FlatPart:
 
 @dataclass(frozen=True)
 class Slot:
-    """Holds a slot at a vertex of a unit, for the end of one shim.
+    """Holds a slot at a vertex of a unit, for the end of one shim."""
 
-    Attributes:
-        vertex: number of the unit's vertex.
-        ligament: id of the ligament.
-        mouth: (2,) the vertex as designed.
-        direction: (2,) unit vector from the mouth to the inner end.
-        depth: from the vertex as designed to the inner end.
-        width: shim thickness + 2 clearance.
-        truncation: how far the tip beside the mouth is cut back, along the slot.
-        wall: thinnest wall around the inner end, to the outline or to another slot.
-    """
-
-    vertex: int
-    ligament: int
-    mouth: Floats
-    direction: Floats
-    depth: float
-    width: float
-    truncation: float
-    wall: float
+    vertex: int  # number of the unit's vertex
+    ligament: int  # id of the ligament
+    mouth: Floats  # (2,) the vertex as designed
+    direction: Floats  # (2,) unit vector from the mouth to the inner end
+    depth: float  # from the vertex as designed to the inner end
+    width: float  # shim thickness + 2 clearance
+    truncation: float  # how far the tip beside the mouth is cut back, along the slot
+    wall: float  # thinnest wall around the inner end, to the outline or to another slot
 
     @property
     def end(self) -> Floats:
@@ -242,20 +221,13 @@ class Ligament:
 
 @dataclass(frozen=True)
 class Shim:
-    """Holds all shims of one length.
+    """Holds all shims of one length."""
 
-    Attributes:
-        id: "S" and the length.
-        length, width: of a piece; the width is the thickness of the units.
-        ligaments: that take it.
-        spares: pieces more than ligaments.
-    """
-
-    id: str
-    length: float
-    width: float
-    ligaments: tuple[int, ...]
-    spares: int
+    id: str  # "S" and the length
+    length: float  # of a piece; the width is the thickness of the units
+    width: float  # likewise
+    ligaments: tuple[int, ...]  # that take it
+    spares: int  # pieces more than ligaments
 
     @property
     def count(self) -> int:
@@ -265,24 +237,15 @@ class Shim:
 
 @dataclass(frozen=True)
 class BuiltSpecimen:
-    """Holds one structure of a study as it is built.
+    """Holds one structure of a study as it is built."""
 
-    Attributes:
-        study: name of the study.
-        structure: intact, altered or cloaked.
-        units: those present, in ascending order of their numbers.
-        ligaments: those present.
-        shims: in ascending order of their lengths.
-        clamped, driven: labels of the units that fixtures hold.
-    """
-
-    study: str
-    structure: str
-    units: tuple[Unit, ...]
-    ligaments: tuple[Ligament, ...]
-    shims: tuple[Shim, ...]
-    clamped: tuple[str, ...] = ()
-    driven: tuple[str, ...] = ()
+    study: str  # name of the study
+    structure: str  # intact, altered or cloaked
+    units: tuple[Unit, ...]  # those present, in ascending order of their numbers
+    ligaments: tuple[Ligament, ...]  # those present
+    shims: tuple[Shim, ...]  # in ascending order of their lengths
+    clamped: tuple[str, ...] = ()  # labels of the units that fixtures hold
+    driven: tuple[str, ...] = ()  # likewise
 
     @property
     def letters(self) -> dict[str, str]:

@@ -20,17 +20,11 @@ _FILLED = 0.2  # mm^2 that a kerf may fill, in narrow corners
 
 @dataclass(frozen=True)
 class LaserSheet:
-    """Holds a sheet with parts on it.
+    """Holds a sheet with parts on it."""
 
-    Attributes:
-        name: of its files, such as "units_sheet1_kerf0.15".
-        size: width and height, mm.
-        parts: in the order in which they are cut, where they lie on the sheet.
-    """
-
-    name: str
-    size: tuple[float, float]
-    parts: tuple[FlatPart, ...]
+    name: str  # of its files, such as "units_sheet1_kerf0.15"
+    size: tuple[float, float]  # width and height, mm
+    parts: tuple[FlatPart, ...]  # in the order in which they are cut, where they lie on the sheet
 
 
 def laser_sheets(

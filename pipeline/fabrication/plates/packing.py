@@ -12,18 +12,12 @@ P = TypeVar("P", FlatPart, PrintedPart)
 
 
 class Spot(NamedTuple):
-    """Holds the place of the lower left corner of a part's box.
+    """Holds the place of the lower left corner of a part's box."""
 
-    Attributes:
-        part: its place in the sequence of parts.
-        sheet: number of the sheet, from zero.
-        x, y: mm from the lower left corner of the sheet.
-    """
-
-    part: int
-    sheet: int
-    x: float
-    y: float
+    part: int  # its place in the sequence of parts
+    sheet: int  # number of the sheet, from zero
+    x: float  # mm from the lower left corner of the sheet
+    y: float  # likewise
 
 
 class TooLargeError(ValueError):
@@ -39,21 +33,13 @@ class TooLargeError(ValueError):
 
 
 class Ground(NamedTuple):
-    """Describes the sheet or bed that parts are laid on.
+    """Describes the sheet or bed that parts are laid on."""
 
-    Attributes:
-        name: sheet or bed; also that of the parameter.
-        section: of the parameters of fabrication.
-        size: width and height, mm.
-        margin: free rim.
-        gap: least distance of two parts.
-    """
-
-    name: str
-    section: str
-    size: tuple[float, float]
-    margin: float
-    gap: float
+    name: str  # sheet or bed; also that of the parameter
+    section: str  # of the parameters of fabrication
+    size: tuple[float, float]  # width and height, mm
+    margin: float  # free rim
+    gap: float  # least distance of two parts
 
 
 def pack(

@@ -26,25 +26,15 @@ _INK, _FAULT = "#1a1a1a", "#d1242f"
 
 @dataclass(frozen=True)
 class Fault:
-    """Holds one violated rule.
+    """Holds one violated rule."""
 
-    Attributes:
-        part: the part in words, such as "unit U012".
-        what: the fault, with the measured and the required number.
-        key: parameter of the section `fabrication` to change, dotted.
-        remedy: how to change it.
-        file: the written file with the fault.
-        around: outlines to show, in mm.
-        spot: where the fault is, in mm.
-    """
-
-    part: str
-    what: str
-    key: str
-    remedy: str
-    file: Path
-    around: tuple[Geometry, ...] = ()
-    spot: Geometry | None = None
+    part: str  # the part in words, such as "unit U012"
+    what: str  # the fault, with the measured and the required number
+    key: str  # parameter of the section `fabrication` to change, dotted
+    remedy: str  # how to change it
+    file: Path  # the written file with the fault
+    around: tuple[Geometry, ...] = ()  # outlines to show, in mm
+    spot: Geometry | None = None  # where the fault is, in mm
 
 
 def unreadable(kind: str, path: Path, why: object) -> UserError:

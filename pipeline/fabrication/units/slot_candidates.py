@@ -54,20 +54,14 @@ class Corner:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Holds possible slots at one corner.
+    """Holds possible slots at one corner."""
 
-    Attributes:
-        mouth: (2,) the vertex.
-        direction: (n, 2) unit vectors.
-        depth, truncation, wall, cost: (n,).
-    """
-
-    mouth: Floats
-    direction: Floats
-    depth: Floats
-    truncation: Floats
-    wall: Floats
-    cost: Floats
+    mouth: Floats  # (2,) the vertex
+    direction: Floats  # (n, 2) unit vectors
+    depth: Floats  # (n,)
+    truncation: Floats  # likewise
+    wall: Floats  # likewise
+    cost: Floats  # likewise
 
     def __len__(self) -> int:
         return len(self.depth)

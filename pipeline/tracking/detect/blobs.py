@@ -35,25 +35,15 @@ _DOTS = 4
 
 @dataclass(frozen=True)
 class LatticeDetection:
-    """Holds units of a specimen, matched with blobs of a frame.
+    """Holds units of a specimen, matched with blobs of a frame."""
 
-    Attributes:
-        camera: what sees the blobs where they are.
-        unit: (matches,) units that have a blob of their own.
-        blob: (matches, 2) its centroid, px.
-        blobs: number of blobs of a unit's size.
-        bright: whether the units are brighter than what is behind them.
-        missing: number of units without one that should be in the picture.
-        surplus: number of blobs without a unit that go on with the lattice.
-    """
-
-    camera: Camera
-    unit: Ints
-    blob: Floats
-    blobs: int
-    bright: bool
-    missing: int
-    surplus: int = 0
+    camera: Camera  # what sees the blobs where they are
+    unit: Ints  # (matches,) units that have a blob of their own
+    blob: Floats  # (matches, 2) its centroid, px
+    blobs: int  # number of blobs of a unit's size
+    bright: bool  # whether the units are brighter than what is behind them
+    missing: int  # number of units without one that should be in the picture
+    surplus: int = 0  # number of blobs without a unit that go on with the lattice
 
     @property
     def score(self) -> int:

@@ -42,22 +42,14 @@ Inside = Callable[[Floats], Mask]
 
 
 class Placement(NamedTuple):
-    """Holds one way in which units lie among patches.
+    """Holds one way in which units lie among patches."""
 
-    Attributes:
-        unit, patch: (matches,) pairs, one unit a patch.
-        place: (units, 2) where all are, by the matches and what they say of the others.
-        turn: of the lattice against its reference, rad.
-        missing: number of units without a patch that should be in view.
-        surplus: number of patches without a unit that go on with the lattice.
-    """
-
-    unit: Ints
-    patch: Ints
-    place: Floats
-    turn: float
-    missing: int
-    surplus: int
+    unit: Ints  # (matches,) pairs, one unit a patch
+    patch: Ints  # likewise
+    place: Floats  # (units, 2) where all are, by the matches and what they say of the others
+    turn: float  # of the lattice against its reference, rad
+    missing: int  # number of units without a patch that should be in view
+    surplus: int  # number of patches without a unit that go on with the lattice
 
     @property
     def score(self) -> int:

@@ -27,17 +27,11 @@ class LatticePlace(NamedTuple):
 
 
 class Relocaliser(NamedTuple):
-    """Looks for a specimen whose units are nowhere near where they were.
+    """Looks for a specimen whose units are nowhere near where they were."""
 
-    Attributes:
-        specimen: the units.
-        camera: of its plane.
-        bright: whether the units are brighter than what is behind them.
-    """
-
-    specimen: SpecimenOutlines
-    camera: Camera
-    bright: bool
+    specimen: SpecimenOutlines  # the units
+    camera: Camera  # of its plane
+    bright: bool  # whether the units are brighter than what is behind them
 
     def in_view(self, pose: Floats, margin: float = 0.0) -> Mask:
         """Tells which units (units,) have their middle in the picture, radii from its rim."""

@@ -53,29 +53,17 @@ _FEWEST = 5.0
 
 
 class Templates(NamedTuple):
-    """Holds the looks of the units in their own frames, and where they rest.
+    """Holds the looks of the units in their own frames, and where they rest."""
 
-    Attributes:
-        brightness: (units, rows, columns) at the nodes, y up.
-        weight: (units, rows, columns) of the nodes, zero outside the unit and near the rim.
-        half: the grids reach from -half to half, mm.
-        step: distance of the nodes, mm.
-        centre: (units, 2) place at rest, mm.
-        contrast: (units,) standard deviation of the brightness within the weight.
-        reach: (units,) largest radius of the weight, mm.
-        noise: standard deviation of the brightness' noise.
-        cells: between the nodes.
-    """
-
-    brightness: Singles
-    weight: Singles
-    half: float
-    step: float
-    centre: Floats
-    contrast: Floats
-    reach: Floats
-    noise: float
-    cells: TemplateCells
+    brightness: Singles  # (units, rows, columns) at the nodes, y up
+    weight: Singles  # (units, rows, columns) of the nodes, zero outside the unit and near the rim
+    half: float  # the grids reach from -half to half, mm
+    step: float  # distance of the nodes, mm
+    centre: Floats  # (units, 2) place at rest, mm
+    contrast: Floats  # (units,) standard deviation of the brightness within the weight
+    reach: Floats  # (units,) largest radius of the weight, mm
+    noise: float  # standard deviation of the brightness' noise
+    cells: TemplateCells  # between the nodes
 
 
 class FitStart(NamedTuple):

@@ -63,17 +63,11 @@ def broken_off(path: Path, why: str, count: int, time: float) -> BrokenOffError:
 
 @dataclass(frozen=True)
 class Frame:
-    """Holds a picture of the video.
+    """Holds a picture of the video."""
 
-    Attributes:
-        index: from zero.
-        time: since the file's first frame, s, by the file's time stamps.
-        image: (rows, columns) brightness, from 0 to 255.
-    """
-
-    index: int
-    time: float
-    image: Picture
+    index: int  # from zero
+    time: float  # since the file's first frame, s, by the file's time stamps
+    image: Picture  # (rows, columns) brightness, from 0 to 255
 
 
 def read_frames(

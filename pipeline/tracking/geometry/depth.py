@@ -17,17 +17,11 @@ _ROUNDS = 4
 
 
 class Depth(NamedTuple):
-    """Holds the thickness of the units and the place of the camera.
+    """Holds the thickness of the units and the place of the camera."""
 
-    Attributes:
-        thickness: mm.
-        foot: (2,) of the camera on the faces' plane, mm.
-        height: of the camera above it, mm.
-    """
-
-    thickness: float
-    foot: Floats
-    height: float
+    thickness: float  # mm
+    foot: Floats  # (2,) of the camera on the faces' plane, mm
+    height: float  # of the camera above it, mm
 
     @property
     def shrink(self) -> float:

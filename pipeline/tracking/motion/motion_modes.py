@@ -30,17 +30,11 @@ _JOLT = 3.0
 
 
 class MotionModes(NamedTuple):
-    """Holds motions taken apart.
+    """Holds motions taken apart."""
 
-    Attributes:
-        amplitude: (frames, n).
-        shape: (n, units).
-        rest: (frames, units) what is left.
-    """
-
-    amplitude: Floats
-    shape: Floats
-    rest: Floats
+    amplitude: Floats  # (frames, n)
+    shape: Floats  # (n, units)
+    rest: Floats  # (frames, units) what is left
 
 
 def separate_modes(motion: Floats, near: Ints, noise: float) -> MotionModes:

@@ -26,18 +26,12 @@ _FADED = 1.75
 
 
 class Patch(NamedTuple):
-    """Holds a patch of the first of two pictures.
+    """Holds a patch of the first of two pictures."""
 
-    Attributes:
-        before, after: the pictures (rows, columns).
-        outline: (n, 2) in the first one.
-        centre: (2,) whose motion is told.
-    """
-
-    before: Image
-    after: Image
-    outline: Floats
-    centre: Floats
+    before: Image  # the pictures (rows, columns)
+    after: Image  # likewise
+    outline: Floats  # (n, 2) in the first one
+    centre: Floats  # (2,) whose motion is told
 
 
 def find_motion(patch: Patch) -> Floats | None:

@@ -12,17 +12,11 @@ _KNOTS, _FEWEST = 7, 4
 
 
 class _Interpolated(NamedTuple):
-    """Holds what polynomials of rising order tell of a unit.
+    """Holds what polynomials of rising order tell of a unit."""
 
-    Attributes:
-        known: (n,) frames in which it is seen.
-        pose: (orders, n, 3) at the frames' times.
-        growth: (orders, n, 3) variance over that of the poses seen.
-    """
-
-    known: Ints
-    pose: Floats
-    growth: Floats
+    known: Ints  # (n,) frames in which it is seen
+    pose: Floats  # (orders, n, 3) at the frames' times
+    growth: Floats  # (orders, n, 3) variance over that of the poses seen
 
 
 def at_frame_times(

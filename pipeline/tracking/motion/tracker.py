@@ -61,46 +61,29 @@ _RETRIES = 4
 
 
 class Shutter(NamedTuple):
-    """Holds the shutter of a camera.
+    """Holds the shutter of a camera."""
 
-    Attributes:
-        exposure: of a row, s; without it, the first quick motions tell.
-        readout: from the first row to the last, s.
-        noise: residuals to expect of the sensor's noise, levels.
-    """
-
-    exposure: float | None = None
-    readout: float = 0.0
-    noise: float = 0.0
+    exposure: float | None = None  # of a row, s; without it, the first quick motions tell
+    readout: float = 0.0  # from the first row to the last, s
+    noise: float = 0.0  # residuals to expect of the sensor's noise, levels
 
 
 _GLOBAL = Shutter()
 
 
 class MotionBlur(NamedTuple):
-    """Holds what a quick motion tells of the exposure.
+    """Holds what a quick motion tells of the exposure."""
 
-    Attributes:
-        time: of the frame, s.
-        exposure: which blurs as is seen, s.
-        speed: (units,) by which it does, mm/s; NaN of those that are not quick.
-    """
-
-    time: float
-    exposure: float
-    speed: Floats
+    time: float  # of the frame, s
+    exposure: float  # which blurs as is seen, s
+    speed: Floats  # (units,) by which it does, mm/s; NaN of those that are not quick
 
 
 class TrackedFrame(NamedTuple):
-    """Holds the outcome of a frame.
+    """Holds the outcome of a frame."""
 
-    Attributes:
-        fits: poses and what is known of them; NaN where not found.
-        quality: (units,) GOOD or the reason.
-    """
-
-    fits: PoseFits
-    quality: Ints
+    fits: PoseFits  # poses and what is known of them; NaN where not found
+    quality: Ints  # (units,) GOOD or the reason
 
 
 class _Trial(NamedTuple):

@@ -57,29 +57,17 @@ _CHANGED = 0.005
 
 
 class Track(NamedTuple):
-    """Holds the motions of the units of a specimen.
+    """Holds the motions of the units of a specimen."""
 
-    Attributes:
-        time: (frames,) since the first of them, s.
-        start: time of that one since the file's first frame, s.
-        frame: (frames,) numbers in the file.
-        displacement: (frames, units, 3) from the first frame on, mm and rad, NaN where missing.
-        sigma: the standard uncertainties, likewise.
-        quality: (frames, units) as in `tracker`.
-        timing: (frames,) as in `frame_timing`.
-        calibration: of the camera.
-        ended: what ended it before the video's end, if anything did.
-    """
-
-    time: Floats
-    start: float
-    frame: Ints
-    displacement: Reals
-    sigma: Reals
-    quality: NDArray[np.int8]
-    timing: Ints
-    calibration: CameraCalibration
-    ended: _End | None
+    time: Floats  # (frames,) since the first of them, s
+    start: float  # time of that one since the file's first frame, s
+    frame: Ints  # (frames,) numbers in the file
+    displacement: Reals  # (frames, units, 3) from the first frame on, mm and rad, NaN where missing
+    sigma: Reals  # the standard uncertainties, likewise
+    quality: NDArray[np.int8]  # (frames, units) as in `tracker`
+    timing: Ints  # (frames,) as in `frame_timing`
+    calibration: CameraCalibration  # of the camera
+    ended: _End | None  # what ended it before the video's end, if anything did
 
 
 def track_video(

@@ -40,27 +40,16 @@ _EDGE_SIGMA = 0.02
 
 
 class CameraCalibration(NamedTuple):
-    """Holds what a reference frame tells.
+    """Holds what a reference frame tells."""
 
-    Attributes:
-        camera: refined on the outlines of the units.
-        grid: nodes for templates.
-        blur: standard deviation of the blur at edges, mm.
-        pixel: size of a pixel at the middle of the specimen, mm.
-        residual: (units, 2) where the units are seen less where they should be, px.
-        depth: of thick units whose walls are of the shade of their faces.
-        bright: whether the units are brighter than what is behind them.
-        outlines: how these were fitted, from where the design has them.
-    """
-
-    camera: Camera
-    grid: TemplateGrid
-    blur: float
-    pixel: float
-    residual: Floats
-    depth: Depth | None
-    bright: bool
-    outlines: PoseFits
+    camera: Camera  # refined on the outlines of the units
+    grid: TemplateGrid  # nodes for templates
+    blur: float  # standard deviation of the blur at edges, mm
+    pixel: float  # size of a pixel at the middle of the specimen, mm
+    residual: Floats  # (units, 2) where the units are seen less where they should be, px
+    depth: Depth | None  # of thick units whose walls are of the shade of their faces
+    bright: bool  # whether the units are brighter than what is behind them
+    outlines: PoseFits  # how these were fitted, from where the design has them
 
 
 class RecordingSetup(NamedTuple):

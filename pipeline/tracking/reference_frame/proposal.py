@@ -30,23 +30,14 @@ _GOOD, _MISSING = (60, 140, 20), (0, 123, 224)  # blue, green, red
 
 
 class Proposal(NamedTuple):
-    """Holds what the first frame shows.
+    """Holds what the first frame shows."""
 
-    Attributes:
-        structure: the design's structure that fits best.
-        specimen: its units.
-        detection: where they are.
-        kind: dots, speckle or bare.
-        pixel_size: mm.
-        doubts: what could not be told, in words.
-    """
-
-    structure: str
-    specimen: SpecimenOutlines
-    detection: LatticeDetection
-    kind: str
-    pixel_size: float
-    doubts: tuple[str, ...]
+    structure: str  # the design's structure that fits best
+    specimen: SpecimenOutlines  # its units
+    detection: LatticeDetection  # where they are
+    kind: str  # dots, speckle or bare
+    pixel_size: float  # mm
+    doubts: tuple[str, ...]  # what could not be told, in words
 
 
 def propose(image: Picture, design: xr.Dataset, px_per_mm: float | None = None) -> Proposal:
