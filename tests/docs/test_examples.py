@@ -13,7 +13,7 @@ from pipeline.posing import failures
 from pipeline.problem.reading import load, overlay_keys
 from pipeline.runtime import ROOT, UserError
 from pipeline.tracking.reference_frame import recognition
-from pipeline.workflow import run
+from pipeline.workflow import study_lock
 from tests.docs.pages import PLACE, Block, blocks, text
 from tests.docs.walk import LAID_OVER, check_recording, checked
 
@@ -57,7 +57,7 @@ def test_drives_are_as_the_page_says(block: Block, problem: Path) -> None:
     [
         ("beyond a driven displacement of", failures),
         ("the first frame does not show this design", recognition),
-        ("snakemake is already at work in this folder", run),
+        ("another run is at work on", study_lock),
     ],
 )
 def test_a_message_within_a_sentence_is_the_codes(phrase: str, module: ModuleType) -> None:

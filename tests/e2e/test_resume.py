@@ -119,7 +119,7 @@ def test_a_second_run_in_the_same_folder_is_refused(fresh: Checkout) -> None:
     wait_until((fresh.results / "logs/design_sqp.log").exists, run)
     ended = fresh.make()
     assert ended.returncode != 0
-    assert "snakemake is already at work in this folder" in ended.stderr
+    assert "another run is at work on tiny" in ended.stderr
     assert "remedy:" in ended.stderr
     assert run.poll() is None
     kill_everything(run, fresh)

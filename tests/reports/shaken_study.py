@@ -23,7 +23,7 @@ from tests.reports import compressed_study
 
 PROBLEM = Path(__file__).parents[2] / "experiments" / "fig2" / "problem.yaml"
 
-KINDS: tuple[Output, ...] = ("design", "response", "sweep")
+KINDS: tuple[Output, ...] = ("design", "response", "sweep", "scatter")
 
 REACH = {"altered": 1.0, "cloaked": 0.12}
 """Amplitude of the surroundings of each structure, of what the sheet would do."""
@@ -49,10 +49,6 @@ def written(folder: Path, preset: str | None = None) -> StudyResults:
         files["constants"] = folder / "constants.nc"
         about = provenance.of_study(posed, "sweep")
         datasets.write(constants(posed), files["constants"], "sweep", about)
-    if chosen.robustness is not None:
-        files["scatter"] = folder / "scatter.nc"
-        about = provenance.of_study(chosen, "monte_carlo")
-        datasets.write(compressed_study.scatter(chosen), files["scatter"], "scatter", about)
     if chosen.report.as_built:
         files["built"] = folder / "built.nc"
         about = provenance.of_study(chosen, "as_built", plan={})
@@ -68,11 +64,11 @@ def constants(posed: Problem) -> xr.Dataset:
     return sweep_stage.dataset(posed, cases, found)
 
 
-def write(folder: Path, preset: str | None = None) -> tuple[Path, Path, Path]:
-    """Write design.nc, response.nc and sweep.nc; returns their paths."""
+def write(folder: Path, preset: str | None = None) -> list[Path]:
+    """Write the datasets of all kinds; returns their paths."""
     chosen = problem.load(PROBLEM, preset)
     lattice = _lattice(chosen)
-    paths = (folder / "design.nc", folder / "response.nc", folder / "sweep.nc")
+    paths = [folder / f"{kind}.nc" for kind in KINDS]
     about = provenance.of_study(chosen, "design")
     datasets.write(design(chosen, lattice), paths[0], "design", about)
     shared = ["simulation of the unloaded reference: it is zero"]
@@ -83,6 +79,8 @@ def write(folder: Path, preset: str | None = None) -> tuple[Path, Path, Path]:
     about = provenance.of_study(chosen, "simulate", parents={"design": paths[0]}, plan=plan)
     datasets.write(response(chosen, lattice), paths[1], "response", about)
     datasets.write(sweep(chosen), paths[2], "sweep", provenance.of_study(chosen, "sweep"))
+    about = provenance.of_study(chosen, "monte_carlo")
+    datasets.write(compressed_study.scatter(chosen), paths[3], "scatter", about)
     return paths
 
 

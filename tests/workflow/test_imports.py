@@ -4,6 +4,9 @@ import importlib
 
 from pipeline.runtime import ROOT
 
+ELSEWHERE = ("benchmarks.tracking.pyvale_points",)
+"""Runs in an environment of its own."""
+
 MODULES = sorted(
     ".".join(path.relative_to(ROOT).with_suffix("").parts)
     for room in ("sim", "pipeline", "reports", "benchmarks")
@@ -13,5 +16,5 @@ MODULES = sorted(
 
 
 def test_every_module_can_be_imported() -> None:
-    for module in MODULES:
+    for module in set(MODULES) - set(ELSEWHERE):
         assert importlib.import_module(module).__name__ == module

@@ -9,10 +9,16 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from pipeline.calibration import population
 from pipeline.calibration.experiments import force_displacement
 from pipeline.calibration.inputs import ELASTIC_NAMES, Constants, Population
 from pipeline.calibration.inputs.description import TestKind
+from pipeline.calibration.population import (
+    curve_emulator,
+    hierarchical_model,
+    missing_physics,
+    prediction,
+    sample_readings,
+)
 from pipeline.calibration.population.curve_emulator import CurveEmulator
 from pipeline.calibration.population.sample_readings import SampleCurve
 from pipeline.problem.reading import load_section
@@ -35,7 +41,7 @@ def centre(asked: Population) -> Constants:
 
 @pytest.fixture(scope="module")
 def emulator(asked: Population, centre: Constants) -> CurveEmulator:
-    return population.curve_emulator.emulate(asked.lattice, "compression", centre, 3.75)
+    return curve_emulator.emulate(asked.lattice, "compression", centre, 3.75)
 
 
 def curves(*factors: float) -> list[SampleCurve]:
@@ -60,9 +66,7 @@ def test_curves_are_those_of_the_simulator(
     weights, base = emulator.weights(at), np.log(at)
 
     def total(place: jax.Array) -> jax.Array:
-        return jnp.exp(
-            population.curve_emulator.log_force(weights, emulator.centre, base, place)
-        ).sum()
+        return jnp.exp(curve_emulator.log_force(weights, emulator.centre, base, place)).sum()
 
     np.testing.assert_allclose(total(jnp.asarray(logs)), posed.predict(constants).sum(), rtol=5e-4)
     by_adjoint = posed.pulled_back(constants, np.ones(3))[:3] * np.exp(logs)
@@ -71,7 +75,7 @@ def test_curves_are_those_of_the_simulator(
 
 def test_readings_are_thinned_and_shared(emulator: CurveEmulator) -> None:
     known: Mapping[TestKind, CurveEmulator] = {"compression": emulator}
-    found, names = population.sample_readings.stack_readings(curves(1.0, 1.2), known, SAMPLES, 5)
+    found, names = sample_readings.stack_readings(curves(1.0, 1.2), known, SAMPLES, 5)
     assert found.used.shape == (1, 15)
     assert names[0][::5] == ["compression_s1", "compression_s2", "compression_s1_s2"]
     np.testing.assert_allclose(
@@ -91,15 +95,15 @@ def test_readings_are_thinned_and_shared(emulator: CurveEmulator) -> None:
 def test_the_band_holds_whole_curves() -> None:
     random = np.random.default_rng(0)
     drawn = 0.1 * random.standard_t(3, size=(20_000, 1)) + 0.02 * random.normal(size=(20_000, 12))
-    band = population.prediction.find_band(drawn)
+    band = prediction.find_band(drawn)
     assert abs(band.holds(drawn).mean() - 0.95) < 1e-3
     assert ((drawn >= band.low) & (drawn <= band.high)).mean() > 0.955
 
 
 def test_students_interval_of_a_few_samples(emulator: CurveEmulator) -> None:
-    curve = population.prediction.pose_curve(emulator, np.array([1.0, 2.0]), 0)
+    curve = prediction.pose_curve(emulator, np.array([1.0, 2.0]), 0)
     logs = np.log([120.0, 1.2, 1.5]) + np.array([-0.1, 0.0, 0.1])[:, None]
-    band = population.prediction.student_band(curve, logs)
+    band = prediction.student_band(curve, logs)
     reach = student.ppf(0.975, 2) * 0.1 * np.sqrt(4 / 3)
     np.testing.assert_allclose(band.half_width, reach)
     np.testing.assert_allclose(band.median, curve.predict(logs[1]))
@@ -116,10 +120,10 @@ def test_a_known_sample_is_predicted_better_than_a_new_one(emulator: CurveEmulat
         "mounting": np.full((count, 1), 0.01),
         "reading": np.full((count, 1), 0.001),
     }
-    curve = population.prediction.pose_curve(emulator, np.array([1.0, 2.0, 3.0]), 0)
+    curve = prediction.pose_curve(emulator, np.array([1.0, 2.0, 3.0]), 0)
     random = np.random.default_rng(0)
-    new = population.prediction.new_curves(curve, draws, random, repeats=1)
-    known = population.prediction.new_curves(curve, draws, random, sample=0, repeats=1)
+    new = prediction.new_curves(curve, draws, random, repeats=1)
+    known = prediction.new_curves(curve, draws, random, sample=0, repeats=1)
     np.testing.assert_allclose(known.std(axis=0), np.hypot(0.02, 0.01), rtol=0.1)
     assert (new.std(axis=0) > 3 * known.std(axis=0)).all()
 
@@ -133,26 +137,26 @@ def test_mean_and_spread_are_drawn_from_their_law() -> None:
         "constants": constants[None]
     }
     centre, flat = np.array([4.1, 0.1, 0.9]), np.log(1e4)
-    priors = population.hierarchical_model.PriorNumbers(centre, flat, np.log([0.1] * 4), flat)
-    found = population.prediction.redraw_population(draws, priors, random, 40_000)
+    priors = hierarchical_model.PriorNumbers(centre, flat, np.log([0.1] * 4), flat)
+    found = prediction.redraw_population(draws, priors, random, 40_000)
     new = found["mean"] + found["spread"] * random.normal(size=found["mean"].shape)
     scale = np.sqrt(0.02 / 3) * np.sqrt(5 / 4)
     expected = constants.mean(axis=0) + scale * student.ppf([[0.1], [0.5], [0.9]], 3)
     np.testing.assert_allclose(np.quantile(new, [0.1, 0.5, 0.9], axis=0), expected, atol=0.006)
 
     sure = priors._replace(constants=np.array(1e-3), wide=np.array(1e-3))
-    found = population.prediction.redraw_population(draws, sure, random, 100)
+    found = prediction.redraw_population(draws, sure, random, 100)
     np.testing.assert_allclose(found["mean"], np.tile(centre, (100, 1)), atol=5e-3)
     np.testing.assert_allclose(found["spread"], 0.1, rtol=6e-3)
 
 
 def test_what_is_missing_is_found(asked: Population, centre: Constants) -> None:
-    path = population.missing_physics.follow_test(asked.lattice, "shear", centre, 3.75)
-    late = next(each for each in population.missing_physics.MECHANISMS if "late" in each.name)
+    path = missing_physics.follow_test(asked.lattice, "shear", centre, 3.75)
+    late = next(each for each in missing_physics.MECHANISMS if "late" in each.name)
     at = np.linspace(0.5, 3.75, 10)
     truth = 2 * np.interp(at, path.displacement[1:], late.change(path)[1:] / path.force[1:])
-    none = population.missing_physics.FittedSlopes([np.zeros((5, 3))], np.zeros((10, 3)))
-    ranked = population.missing_physics.rank_mechanisms([path], path, none, np.ones(3), at, truth)
+    none = missing_physics.FittedSlopes([np.zeros((5, 3))], np.zeros((10, 3)))
+    ranked = missing_physics.rank_mechanisms([path], path, none, np.ones(3), at, truth)
     assert ranked[0].name == late.name
     np.testing.assert_allclose((ranked[0].explained, ranked[0].wanted), (0.5, 2.0), rtol=1e-6)
 
@@ -171,12 +175,12 @@ def test_a_force_of_the_wrong_sign_is_refused(asked: Population, tmp_path: Path)
     (tmp_path / "pull.csv").write_text(f"displacement (mm),force (N)\n{lines}\n")
     wrong = asked.data[0].model_copy(update={"file": "pull.csv"})
     with refused("not above zero", "force", file=tmp_path / "pull.csv"):
-        population.sample_readings.read_curve(wrong, tmp_path)
+        sample_readings.read_curve(wrong, tmp_path)
 
 
 def test_priors_are_doubled_in_their_logarithms(asked: Population) -> None:
-    plain = population.hierarchical_model.prior_numbers(asked.priors, np.zeros(3))
-    doubled = population.hierarchical_model.prior_numbers(asked.priors.doubled, np.zeros(3))
+    plain = hierarchical_model.prior_numbers(asked.priors, np.zeros(3))
+    doubled = hierarchical_model.prior_numbers(asked.priors.doubled, np.zeros(3))
     np.testing.assert_allclose(doubled.constants, 2 * np.asarray(plain.constants))
     np.testing.assert_allclose(doubled.wide, 2 * np.asarray(plain.wide))
     np.testing.assert_allclose(doubled.medians, plain.medians)

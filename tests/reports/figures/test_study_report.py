@@ -1,3 +1,4 @@
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
 
 
-def command(paths: tuple[Path, Path, Path], out: Path, preset: str | None) -> list[str]:
+def command(paths: Sequence[Path], out: Path, preset: str | None) -> list[str]:
     names = zip(shaken_study.KINDS, paths, strict=True)
     given = [word for name, path in names for word in (f"--{name}", str(path))]
     chosen = [] if preset is None else ["--preset", preset]
@@ -43,7 +44,7 @@ def test_command_line(tmp_path: Path) -> None:
     assert main(command(paths, out, "quick")) == 0
     assert (out / "index.html").is_file()
     assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "design.nc", "report", "response.nc", "sweep.nc"
+        "design.nc", "report", "response.nc", "scatter.nc", "sweep.nc"
     ]  # fmt: skip
 
 
