@@ -60,7 +60,7 @@ print(time.monotonic() - began, working_time() - worked)
 
 
 def twice(folder: Path, script: str) -> tuple[list[str], list[str]]:
-    """What a script prints that finds no compiled loop, and what it prints once it does."""
+    """Runs a script before and after its loop is compiled; returns what it prints."""
     (folder / "loops.py").write_text(LOOPS)
     places = {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder}", "NUMBA_CACHE_DIR": str(folder)}
     command = [sys.executable, "-c", script]
