@@ -6,7 +6,7 @@ from scipy.ndimage import distance_transform_edt
 
 from pipeline.tracking.fit.patch_correlation import Templates
 from pipeline.tracking.fit.template_cells import classify
-from sim.core import Floats, Reals, Singles
+from sim.core import Floats, Mask, Reals, Singles
 
 _LEAST = 0.4
 """A way that is not worth a template of its own, px; so is a change of a third of this."""
@@ -42,13 +42,18 @@ class ExposureBlur:
         self._way = np.zeros((len(self._sharp), 3))
         self.share = np.ones((len(self._sharp), 2), np.float16)
 
-    def redraw(self, way: Floats) -> None:
-        """Blurs by ways (units, 3) in mm and rad, in the units' frames, from end to end."""
+    def redraw(self, way: Floats, chosen: Mask | None = None) -> None:
+        """Blurs by ways (units, 3) in mm and rad, in the units' frames, from end to end.
+
+        Units that are not ``chosen`` (by default all are) stay as they are.
+        """
         arm = np.column_stack([way[:, :2], way[:, 2] * self._templates.reach])
         before = np.column_stack([self._way[:, :2], self._way[:, 2] * self._templates.reach])
         length = np.linalg.norm(arm, axis=1) / self._pixel
         changed = np.linalg.norm(arm - before, axis=1) / self._pixel > _LEAST / 3
         changed &= (length > _LEAST) | (np.linalg.norm(before, axis=1) > 0)
+        if chosen is not None:
+            changed &= chosen
         for unit in np.flatnonzero(changed).tolist():
             self._draw(unit, way[unit] if length[unit] > _LEAST else np.zeros(3), length[unit])
 
@@ -113,9 +118,12 @@ def _share(face: Reals, bent: Reals, weight: Reals, way: Floats) -> Floats:
     across = (ahead[0] * down - ahead[1] * right, *light)
     columns = (ahead[0] * right + ahead[1] * down, x * down - y * right, *across)
     shown = (ahead[0] * bent_right + ahead[1] * bent_down, x * bent_down - y * bent_right)
-    root = np.sqrt(weight[used])[:, None]
-    fit = np.linalg.lstsq(np.stack(columns, 1) * root, np.stack(shown, 1) * root, rcond=None)[0]
-    return np.asarray(np.clip(np.diagonal(fit[:2]), 0.0, 1.0))
+    known, wanted = np.stack(columns), np.stack(shown)
+    known /= np.linalg.norm(known, axis=1, keepdims=True) + 1e-12  # its squares are well scaled
+    norm = known * weight[used]
+    fit = np.linalg.lstsq(norm @ known.T, norm @ wanted.T, rcond=None)[0]
+    scale = np.linalg.norm(np.stack(columns[:2]), axis=1) + 1e-12
+    return np.asarray(np.clip(np.diagonal(fit[:2]) / scale, 0.0, 1.0))
 
 
 def _filled(face: Singles, weight: Singles) -> Singles:

@@ -22,10 +22,15 @@ from pipeline.problem.sections import VirtualRecording
 
 
 class Window(Section):
-    """The part of the video that is tracked; its first frame shows the specimen at rest."""
+    """The part of the video that is tracked; its first frame shows the specimen at rest.
 
-    start: Delay = 0.0  # since the file's first frame
-    end: Duration | None = None  # likewise; by default that of the file
+    Attributes:
+        start: since the file's first frame.
+        end: likewise; by default that of the file.
+    """
+
+    start: Delay = 0.0
+    end: Duration | None = None
 
     @model_validator(mode="after")
     def _forwards(self) -> Self:
@@ -36,12 +41,19 @@ class Window(Section):
 
 
 class LoadCellLog(Section):
-    """Forces that were logged beside the video, with a clock of their own."""
+    """Forces that were logged beside the video, with a clock of their own.
 
-    file: str = Field(min_length=1)  # a CSV with a heading, as seen from the recording's own file
-    time: str = "time"  # name of the column of times, s
-    force: str = "force"  # name of the column of forces, N
-    offset: float = 0.0  # time of the video's first frame on the log's clock, s
+    Attributes:
+        file: a CSV with a heading, as seen from the recording's own file.
+        time: name of the column of times, s.
+        force: name of the column of forces, N.
+        offset: time of the video's first frame on the log's clock, s.
+    """
+
+    file: str = Field(min_length=1)
+    time: str = "time"
+    force: str = "force"
+    offset: float = 0.0
 
 
 class Recording(Section):

@@ -110,13 +110,13 @@ def constant_share(amplitude: Floats) -> float:
     return float(np.sum(basis.sum(axis=0) ** 2) / len(basis))
 
 
-def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats, coded: bool) -> Floats:
+def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats) -> Floats:
     """Measures amplitudes (frames, n) against polynomials in time through those beside, per frame.
 
     The order is the lowest that leaves little more than the next ones: more is motion. Where even
-    the last one may be, as the motion is too quick or too short, a codec's jitter is taken to be as
-    large, and that of others to be none. A jolt is motion too, so values are held to a few times
-    the usual; frames at the ends are as the next.
+    the last one may be, as the motion is too quick or too short, the jitter is taken to be as
+    large. A jolt is motion too, so values are held to a few times the usual; frames at the ends are
+    as the next.
     """
     found = [_differences(amplitude, steady, time, reach) for reach in _REACHES]
     usual = np.full((len(found), amplitude.shape[1]), np.inf)
@@ -128,7 +128,7 @@ def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats, coded: bool)
     out = np.zeros_like(amplitude)
     for column in range(amplitude.shape[1]):
         order = int(np.argmax(usual[:, column] <= _LITTLE_MORE * usual[:, column].min()))
-        if last < 0 or (order == last and not coded):
+        if last < 0:
             continue
         values, most = found[order][:, column], _JOLT * usual[order, column]
         known = np.nonzero(np.isfinite(values))[0]

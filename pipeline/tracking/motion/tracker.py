@@ -31,8 +31,9 @@ _QUICK, _SHARP = 2.0, 0.7
 may be blurred by its motion where the exposure is not known."""
 _PARTS = np.linspace(0.0, 1.0, 9)
 """Exposures that are tried where none is told, over the interval of frames."""
-_TELLING, _FEW_QUICK, _ENOUGH = 5.0, 3, 5
-"""Motion from frame to frame that tells of the exposure, px; units that must make it; frames."""
+_TELLING, _FEW_QUICK, _MANY_QUICK, _ENOUGH = 5.0, 3, 48, 5
+"""Motion from frame to frame that tells of the exposure, px; units that must make it, and that are
+looked at, at most; frames."""
 _PAST = 3
 """Frames before one that tell of its velocities."""
 _GLARE = 0.4
@@ -192,7 +193,7 @@ class Tracker:
             cos, sin = np.cos(self._pose[:, 2]), np.sin(self._pose[:, 2])
             x, y = way[:, 0], way[:, 1]
             own = np.stack([cos * x + sin * y, cos * y - sin * x, way[:, 2]], axis=1)
-            self._blur.redraw(own)
+            self._blur.redraw(own, chosen)
         usual = self._usual if chosen is None else None
         return self._fitter.fit(image, pose, photometry, chosen, tight, usual, drift)
 
@@ -212,6 +213,9 @@ class Tracker:
         quick &= np.isfinite([pose[:, 0] for _, pose in self._past]).all(axis=0)
         if quick.sum() < _FEW_QUICK or len(self._past) < 2:
             return
+        ids = np.flatnonzero(quick)
+        quick[:] = False
+        quick[ids[:: -(-len(ids) // _MANY_QUICK)]] = True
         left = []
         for part in _PARTS:
             self.exposure = part * self._interval

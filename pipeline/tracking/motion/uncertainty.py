@@ -110,7 +110,7 @@ def _factors(
     if len(motion) < _LEAST_FRAMES or not np.isfinite(motion).any():
         return usual, 0.0
     found = motion_modes.separate_modes(motion, near, float(np.nanmedian(sigma)))
-    ratio = _ratio(np.isfinite(motion), sigma, found, steady, time, coded)
+    ratio = _ratio(np.isfinite(motion), sigma, found, steady, time)
     if not np.isfinite(ratio).any():
         return usual, 0.0
     level = float(np.nanmean(ratio))
@@ -127,15 +127,12 @@ def _ratio(
     found: motion_modes.MotionModes,
     steady: Mask,
     time: Floats,
-    coded: bool,
 ) -> Floats:
     """Returns squared noise over the image's variance (frames, units), NaN if unseen."""
     by_frame, by_unit = motion_modes.leverage(found.amplitude), motion_modes.leverage(found.shape.T)
     freedom = (1 - by_frame)[:, None] * (1 - by_unit)
     followed = steady & (known.sum(axis=1) > _SEEN * known.sum(axis=1).max())  # no made up ones
-    jitter = (
-        motion_modes.amplitude_jitter(found.amplitude, followed, time, coded) @ found.shape
-    ) ** 2
+    jitter = (motion_modes.amplitude_jitter(found.amplitude, followed, time) @ found.shape) ** 2
     noise = found.rest**2 / np.maximum(freedom, _LEAST_FREEDOM)
     if known.any():  # white noise shakes the shapes' amplitudes too, and is counted in the rest
         jitter = np.maximum(jitter - by_unit * float(np.mean(noise[known])), 0.0)
