@@ -28,13 +28,21 @@ ColumnName = Annotated[str, Field(min_length=1)]
 
 
 class DicColumns(Section):
-    """Names of the columns."""
+    """Names of the columns.
 
-    time: ColumnName = "time"  # in s
-    x: ColumnName = "x"  # place at rest, mm
-    y: ColumnName = "y"  # likewise
-    ux: ColumnName = "u"  # displacement, mm
-    uy: ColumnName = "v"  # likewise
+    Attributes:
+        time: in s.
+        x: place at rest, mm.
+        y: likewise.
+        ux: displacement, mm.
+        uy: likewise.
+    """
+
+    time: ColumnName = "time"
+    x: ColumnName = "x"
+    y: ColumnName = "y"
+    ux: ColumnName = "u"
+    uy: ColumnName = "v"
 
 
 class DicExport(Section):
@@ -64,11 +72,17 @@ class DicExport(Section):
 
 
 class DicPoints(NamedTuple):
-    """Holds points in the specimen's frame, one row a point and time."""
+    """Holds points in the specimen's frame, one row a point and time.
 
-    time: Floats  # (rows,) s
-    place: Floats  # (rows, 2) at rest, mm
-    moved: Floats  # (rows, 2) displacement, mm
+    Attributes:
+        time: (rows,) s.
+        place: (rows, 2) at rest, mm.
+        moved: (rows, 2) displacement, mm.
+    """
+
+    time: Floats
+    place: Floats
+    moved: Floats
 
 
 def load(path: Path) -> DicExport:
