@@ -13,7 +13,7 @@ from typing import TextIO
 from pipeline.runtime import UserError
 
 FOLDER = Path(".snakemake/studies")
-"""Where a lock file for each study lies, which names the process that took it last."""
+"""Holds a lock file for each study, which names the process that took it last."""
 
 _held: list[TextIO] = []
 

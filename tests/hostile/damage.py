@@ -19,7 +19,7 @@ Damage = Callable[[bytes, Random], bytes]
 
 _GIVEN = yaml.safe_load((ROOT / "tests/data/hostile/words.yaml").read_text(encoding="utf-8"))
 WORDS, TOKENS = tuple(_GIVEN["words"]), tuple(_GIVEN["tokens"])
-"""What some key of a YAML file or cell of a CSV, and some part of a drawing, may be given."""
+"""Values to give to some key of a YAML file, cell of a CSV or part of a drawing."""
 
 
 def _turn_bits(content: bytes, random: Random, count: int) -> bytes:

@@ -47,7 +47,7 @@ _Row = tuple[float, int, Singles, Singles, NDArray[np.int8], bool, float, Reals]
 """Time, number, poses, sigma, quality, whether it is the one before again, likeness of residuals
 within blocks, shares of accelerations that show: what is kept of a frame."""
 _OF_DOF = [0, 0, 1]
-"""Which of these shares a shift, or a rotation, has."""
+"""Place in these shares of that of a shift, or of a rotation."""
 _CODED = 1.8
 """Likeness from which on a codec is at work."""
 _UNSURE = 0.25
