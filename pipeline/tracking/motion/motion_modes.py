@@ -27,6 +27,8 @@ _TELLING = 4
 """Fewest frames that tell how much a polynomial of higher order leaves."""
 _LITTLE_MORE = 1.3
 _JOLT = 3.0
+_TOGETHER = 3.0
+"""Likeness of neighbours' changes that is motion, over its standard deviation by chance."""
 
 
 class MotionModes(NamedTuple):
@@ -93,10 +95,28 @@ def _filled(motion: Floats) -> Floats:
 
 
 def _likeness(shape: Floats, near: Ints) -> float:
-    """Correlates a field over the units with the mean of the nearest ones."""
+    """Correlates a field over the units (units, ...) with the mean of the nearest ones."""
     around = shape[near].mean(axis=1)
-    scale = np.sqrt((shape @ shape) * (around @ around))
-    return float(shape @ around / scale) if scale > 0 else 0.0
+    scale = np.sqrt(np.vdot(shape, shape) * np.vdot(around, around))
+    return float(np.vdot(shape, around) / scale) if scale > 0 else 0.0
+
+
+def count_at_rest(place: Floats, near: Ints) -> int:
+    """Counts the first frames in which neighbours do not move alike.
+
+    A motion too small to be seen of one unit is seen of many: noise, a codec's too, moves each by
+    its own.
+
+    Args:
+        place: (frames, units, 2), NaN where missing, of frames that look alike.
+        near: (units, k) the nearest ones of each.
+    """
+    shown = np.nan_to_num(place)
+    for frame in range(1, len(shown)):
+        change = shown[frame] - shown[:frame].mean(axis=0)
+        if _likeness(change, near) > _TOGETHER / np.sqrt(len(near)):
+            return frame
+    return len(shown)
 
 
 def leverage(columns: Floats) -> Floats:

@@ -72,7 +72,7 @@ def calibrate_sigma(
     Returns:
         (frames, units, 3); with too few frames to tell, a usual multiple of the image's own.
     """
-    near = cKDTree(centre).query(centre, k=min(4, len(centre)))[1][:, 1:]
+    near = nearest(centre)
     out = np.empty_like(sigma)
     time = np.arange(len(motion), dtype=float) if time is None else time
     parts = np.array_split(np.arange(len(motion)), -(-len(motion) // _MOST_FRAMES))
@@ -83,6 +83,11 @@ def calibrate_sigma(
             variance, reference = _factors(shown, calm, near, steady[part], time[part], coded)
             out[part, :, dof] = calm * np.sqrt(variance + reference / averaged)
     return out
+
+
+def nearest(centre: Floats) -> Ints:
+    """Returns the numbers (units, 3) of the units nearest to each, at places (units, 2)."""
+    return np.asarray(cKDTree(centre).query(centre, k=min(4, len(centre)))[1][:, 1:])
 
 
 def _calmed(sigma: Floats) -> Floats:

@@ -24,6 +24,7 @@ from pipeline.tracking.motion import uncertainty
 from pipeline.tracking.motion.camera_motion import remove_camera_motion, row_times
 from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults
 from pipeline.tracking.motion.light_slopes import LightSlopes
+from pipeline.tracking.motion.motion_modes import count_at_rest
 from pipeline.tracking.motion.time_interpolation import at_frame_times, middle_speed
 from pipeline.tracking.motion.tracker import POOR_FIT, Shutter, Tracker
 from pipeline.tracking.reference_frame import (
@@ -110,11 +111,13 @@ def track_video(
     if setup.exposure is None and exposure:
         LOG.info("exposure, by the blur of quick motions: %.3g ms", 1000 * exposure)
     time = times - times[0]
+    near = uncertainty.nearest(specimen.centre)
+    rest = count_at_rest(motion[: shown.averaged, :, :2].astype(float), near)
     missed = np.zeros_like(motion)
     if setup.readout or exposure:
         late = row_times(motion, specimen, calibration, setup)
         bend = exposure**2 / 24 * shares[..., _OF_DOF]
-        motion, sigmas, missed = at_frame_times(motion, sigmas, time, late, bend, shown.averaged)
+        motion, sigmas, missed = at_frame_times(motion, sigmas, time, late, bend, rest)
         off = np.sqrt(missed[..., :2].max(axis=-1)) / calibration.pixel
         usual = np.median(off, axis=1, keepdims=True)  # one unit alone has met with noise
         unsure = (off > _UNSURE) & (usual > _UNSURE / 5)
@@ -126,15 +129,13 @@ def track_video(
                 " in the first frame",
                 100 * unsure.mean(),
             )
-    motion = _since_rest(motion, shown.averaged, offset)
+    motion = _since_rest(motion, rest, offset)
     remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     faults = timing_faults(time, motion.astype(float), sigmas.astype(float), same)
     steady = faults != DUPLICATE
     later = likeness[1:][np.isfinite(likeness[1:])]
     coded = not len(later) or float(np.median(later)) > _CODED
-    sigma = uncertainty.calibrate_sigma(
-        motion, sigmas, specimen.centre, steady, time, shown.averaged, coded
-    )
+    sigma = uncertainty.calibrate_sigma(motion, sigmas, specimen.centre, steady, time, rest, coded)
     sigma = np.where(np.isfinite(motion), np.hypot(sigma, np.sqrt(missed)), np.nan)
     start = float(times[0])
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.tracking.motion import uncertainty
+from pipeline.tracking.motion.motion_modes import count_at_rest
 from sim.core import Floats
 
 SIDE = 15
@@ -80,6 +81,20 @@ def test_too_few_frames_get_a_usual_multiple_of_the_image_s_figure() -> None:
     sigma = uncertainty.calibrate_sigma(np.zeros_like(image), image, CENTRE, np.ones(5, bool))
     assert (sigma > 2 * image).all()
     assert (sigma < 3 * image).all()
+
+
+@pytest.mark.parametrize(("drift", "first"), [(0.0, 12), (0.5, 3)])
+def test_frames_that_drift_by_less_than_noise_are_not_at_rest(drift: float, first: int) -> None:
+    """The units drift alike, from the third frame on, by so much of the noise from frame to frame.
+
+    A codec's noise is alike from frame to frame, but not from unit to unit.
+    """
+    random = np.random.default_rng(11)
+    moved = drift * np.maximum(np.arange(12) - 2, 0)[:, None, None] * np.array([1.0, 0.2])
+    noise = random.normal(size=(12, len(CENTRE), 2))
+    noise += np.cumsum(0.5 * random.normal(size=noise.shape), axis=0)
+    near = uncertainty.nearest(CENTRE)
+    assert first <= count_at_rest(moved + noise, near) <= max(first + 2, 5 if drift else 12)
 
 
 def test_a_part_in_which_nothing_is_seen_does_not_disturb_the_others() -> None:
