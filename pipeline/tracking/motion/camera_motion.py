@@ -22,6 +22,8 @@ def remove_camera_motion(
 ) -> None:
     """Takes out, in place, what all clamped units do together, or tells of it.
 
+    Poses of frames that show fewer than two of them are lost (NaN), as the camera's is.
+
     Raises:
         UserError: the camera is to follow supports, and fewer than two are in view.
     """
@@ -39,7 +41,7 @@ def remove_camera_motion(
     if setup.follows_supports:
         subtract_motion(motion, specimen.centre, common)
         return
-    ends = np.abs(common[:, :2]).max() / pixel
+    ends = np.nanmax(np.abs(common[:, :2])) / pixel
     if ends > _MOVED:
         LOG.warning(
             "warning: all clamped units move together, by up to %.2f px: the camera moved, or what"
@@ -51,8 +53,7 @@ def remove_camera_motion(
 def camera_motion(motion: Reals, sigma: Reals, centre: Floats, held: Mask) -> Floats | None:
     """Fits the rigid motion (frames, 3) of the clamped units, about the origin, mm and rad.
 
-    Frames that show none of them have that of the frame before; nothing is returned if there are
-    none in most frames.
+    Frames that show fewer than two have none (NaN); nothing is returned if most frames do.
 
     Args:
         motion: (frames, units, 3) poses, NaN where missing.
@@ -63,16 +64,39 @@ def camera_motion(motion: Reals, sigma: Reals, centre: Floats, held: Mask) -> Fl
     known = np.isfinite(motion[..., 0]) & held
     if (known.sum(axis=1) >= _LEAST).mean() < 0.5:
         return None
-    out = np.zeros((len(motion), 3))
+    out = np.full((len(motion), 3), np.nan)
     for frame, units in enumerate(known):
-        if frame and units.sum() < _LEAST:
-            out[frame] = out[frame - 1]
         if units.sum() >= _LEAST:
             weight = 1 / np.square(sigma[frame, units, :2].astype(float)).sum(axis=1)
             now = centre[units] + motion[frame, units, :2]
             turn, shift = rigid_motion(centre[units], now, weight)
             out[frame] = *shift, turn
     return out
+
+
+def camera_variance(sigma: Reals, centre: Floats, held: Mask) -> Reals:
+    """Returns what the error of the clamped units' motion adds to variances (frames, units, 3).
+
+    A mean with weights w has the variance sum w^2 sigma^2 / (sum w)^2, a turn about it by arms r
+    that of sum (w r sigma)^2 / (sum w r^2)^2: far from the clamped units it shifts others.
+
+    Args:
+        sigma: (frames, units, 3) standard uncertainties, NaN where missing.
+        centre: (units, 2) places at rest.
+        held: (units,) which are clamped.
+    """
+    place = np.square(sigma[:, held, :2].astype(float))
+    weight = np.nan_to_num(1 / place.sum(axis=2, keepdims=True))
+    noise = np.nan_to_num(weight**2 * place)
+    with np.errstate(divide="ignore", invalid="ignore"):  # frames that show none
+        total = weight.sum(axis=1, keepdims=True)
+        middle = np.sum(weight * centre[held], axis=1, keepdims=True) / total
+        arm = (centre[held] - middle)[..., ::-1]
+        shift = noise.sum(axis=1, keepdims=True) / total**2
+        lever = np.sum(weight * arm**2, axis=(1, 2), keepdims=True)
+        turn = np.sum(noise * arm**2, axis=(1, 2), keepdims=True) / lever**2
+    far = shift + turn * (centre - middle)[..., ::-1] ** 2
+    return np.concatenate([far, np.broadcast_to(turn, (*far.shape[:2], 1))], axis=2)
 
 
 def subtract_motion(motion: Reals, centre: Floats, common: Floats) -> None:

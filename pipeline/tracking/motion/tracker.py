@@ -256,12 +256,12 @@ class Tracker:
         self._fitter.full = np.nan_to_num(fits.information)
 
     def _accepted(self, fits: PoseFits, share: float, sharp: bool = True) -> Mask:
-        """Judges fits; one of a unit that is seen in part has to be the better."""
+        """Judges fits; the less of a unit is seen, the better its fit has to be."""
         gain = fits.photometry[:, 0]
         relative = gain / self._gain
         seen = np.minimum(fits.share, 1.0)
         with np.errstate(invalid="ignore", divide="ignore"):
-            fitting = fits.noise / np.abs(gain) < self._limit * 0.5 * (1 + seen)
+            fitting = fits.noise / np.abs(gain) < self._limit * seen
         settled = fits.last < _SETTLED * seen**2
         if sharp and not self.exposure and self._interval > 0:
             quick = np.linalg.norm((fits.pose - self._pose)[:, :2], axis=1) > _QUICK * self._pixel

@@ -55,7 +55,7 @@ def calibrate_sigma(
     centre: Floats,
     steady: Mask,
     time: Floats | None = None,
-    averaged: int = 1,
+    reference: float = 1.0,
     coded: bool = True,
 ) -> Reals:
     """Scales the standard uncertainties so that they tell the scatter of the motions.
@@ -66,8 +66,9 @@ def calibrate_sigma(
         centre: (units, 2) places at rest.
         steady: (frames,) which follow the frame before as their times say.
         time: (frames,) s; by default even.
-        averaged: number of frames that the reference is the mean of.
-        coded: whether residuals are alike within blocks, as codecs leave them.
+        reference: variance of the reference's own error, over that by the image.
+        coded: whether residuals are alike within blocks, as codecs leave them; without a codec, no
+            frame is shown at another time than its own.
 
     Returns:
         (frames, units, 3); with too few frames to tell, a usual multiple of the image's own.
@@ -80,8 +81,8 @@ def calibrate_sigma(
         for dof in range(motion.shape[2]):
             calm = _calmed(sigma[part, :, dof].astype(float))
             shown = motion[part, :, dof].astype(float)
-            variance, reference = _factors(shown, calm, near, steady[part], time[part], coded)
-            out[part, :, dof] = calm * np.sqrt(variance + reference / averaged)
+            variance, common = _factors(shown, calm, near, steady[part], time[part], coded)
+            out[part, :, dof] = calm * np.sqrt(variance + reference * common)
     return out
 
 
@@ -115,7 +116,7 @@ def _factors(
     if len(motion) < _LEAST_FRAMES or not np.isfinite(motion).any():
         return usual, 0.0
     found = motion_modes.separate_modes(motion, near, float(np.nanmedian(sigma)))
-    ratio = _ratio(np.isfinite(motion), sigma, found, steady, time)
+    ratio = _ratio(np.isfinite(motion), sigma, found, steady & coded, time)
     if not np.isfinite(ratio).any():
         return usual, 0.0
     level = float(np.nanmean(ratio))

@@ -21,12 +21,16 @@ from pipeline.tracking.fit import ExposureBlur, PoseFitter, SideWalls, learn_tem
 from pipeline.tracking.frames import BrokenOffError, Frame
 from pipeline.tracking.geometry import SpecimenOutlines, arm_swing
 from pipeline.tracking.motion import uncertainty
-from pipeline.tracking.motion.camera_motion import remove_camera_motion, row_times
+from pipeline.tracking.motion.camera_motion import (
+    camera_variance,
+    remove_camera_motion,
+    row_times,
+)
 from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.motion_modes import count_at_rest
 from pipeline.tracking.motion.time_interpolation import at_frame_times, middle_speed
-from pipeline.tracking.motion.tracker import POOR_FIT, Shutter, Tracker
+from pipeline.tracking.motion.tracker import GOOD, HIDDEN, POOR_FIT, Shutter, Tracker
 from pipeline.tracking.reference_frame import (
     CameraCalibration,
     RecordingSetup,
@@ -131,11 +135,15 @@ def track_video(
             )
     motion = _since_rest(motion, rest, offset)
     remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
+    qualities[np.isnan(motion[..., 0]) & (qualities == GOOD)] = HIDDEN  # as the supports are
     faults = timing_faults(time, motion.astype(float), sigmas.astype(float), same)
     steady = faults != DUPLICATE
     later = likeness[1:][np.isfinite(likeness[1:])]
     coded = not len(later) or float(np.median(later)) > _CODED
-    sigma = uncertainty.calibrate_sigma(motion, sigmas, specimen.centre, steady, time, rest, coded)
+    own = shown.averaged / (shown.averaged + 1) / rest  # a frame's noise, over that of residuals
+    sigma = uncertainty.calibrate_sigma(motion, sigmas, specimen.centre, steady, time, own, coded)
+    if setup.follows_supports and setup.held is not None:
+        missed += camera_variance(sigma, specimen.centre, setup.held)
     sigma = np.where(np.isfinite(motion), np.hypot(sigma, np.sqrt(missed)), np.nan)
     start = float(times[0])
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended)

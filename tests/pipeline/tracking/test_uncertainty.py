@@ -3,13 +3,23 @@
 import numpy as np
 import pytest
 
+from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion import uncertainty
+from pipeline.tracking.motion.camera_motion import camera_variance, remove_camera_motion
 from pipeline.tracking.motion.motion_modes import count_at_rest
+from pipeline.tracking.reference_frame import RecordingSetup
 from sim.core import Floats
 
 SIDE = 15
 PLACES = [(10.0 * i, 10.0 * j) for j in range(SIDE) for i in range(SIDE)]
 CENTRE = np.array(PLACES, np.float64)
+SHOWN = SpecimenOutlines(
+    np.arange(SIDE**2),
+    CENTRE,
+    np.zeros((SIDE**2, 4, 2)),
+    np.empty((0, 2), int),
+    np.zeros((1, 4), bool),
+)
 SIGN = 1.0 - 2.0 * (CENTRE.sum(axis=1) / 10 % 2)
 HONEST = (0.8, 1.25)
 
@@ -95,6 +105,19 @@ def test_frames_that_drift_by_less_than_noise_are_not_at_rest(drift: float, firs
     noise += np.cumsum(0.5 * random.normal(size=noise.shape), axis=0)
     near = uncertainty.nearest(CENTRE)
     assert first <= count_at_rest(moved + noise, near) <= max(first + 2, 5 if drift else 12)
+
+
+def test_what_clamped_units_do_not_tell_of_the_camera_is_in_sigma() -> None:
+    frames, held = 2000, CENTRE[:, 1] < 15
+    noise = 0.01 * np.random.default_rng(12).normal(size=(frames, len(CENTRE), 3))
+    noise[0, np.flatnonzero(held)[1:]] = np.nan
+    motion, sigma = np.where(held[:, None], noise, 0.0), np.full_like(noise, 0.01)
+    remove_camera_motion(
+        motion, sigma, SHOWN, 1.0, RecordingSetup(held=held, follows_supports=True)
+    )
+    assert np.isnan(motion[0]).all()
+    told = camera_variance(sigma, CENTRE, held)[1:, ~held].mean(axis=0)
+    np.testing.assert_allclose(motion[1:, ~held].var(axis=0), told, rtol=0.15)
 
 
 def test_a_part_in_which_nothing_is_seen_does_not_disturb_the_others() -> None:
