@@ -28,7 +28,7 @@ from pipeline.runtime import REPORTED
 from pipeline.stages.verify import variants
 from reports.study import StudyResults, study_results
 from sim.structure import Lattice
-from tests.pipeline import static
+from tests.pipeline import static, unchanged
 from tests.pipeline.samples import filled
 
 ROBUSTNESS = "robustness: { samples: 5 }\n"
@@ -79,28 +79,12 @@ def _lattices(chosen: Problem) -> dict[str, Lattice]:
 
 
 def design(chosen: Problem, path: Path) -> xr.Dataset:
-    intact, altered = lattice_of(chosen), altered_lattice_of(chosen)
-    vertices = spread(altered.padded(altered.vertices), altered, intact.n_units)
-    return xr.Dataset(
-        network_variables(chosen, scene_of(chosen, path.parent))
-        | _history()
-        | {
-            "vertices": (("unit", "vertex", "xy"), vertices),
-            "vertices_initial": (("unit", "vertex", "xy"), intact.padded(intact.vertices)),
-            "end_angles": (("ligament", "end"), np.full((intact.n_ligaments, 2), np.nan)),
-            "centroid": (("unit", "xy"), vertices.mean(axis=1)),
-            "constraint_margin": ("constraint", np.array([0.0, 0.01, 2e-9])),
-            "smallest_gap": ((), 0.11),
-            "overlaps": ((), 0),
-        },
-        unit_coordinates(intact)
-        | {
-            "direction": ("case", [180.0]),
-            "method": list(chosen.optimiser.methods.chosen),
-            "constraint": ["edge_length", "block_angle", "void_angle"],
-            "constraint_units": ("constraint", ["mm", "rad", "rad"]),
-        },
-        {"shipped_method": "sqp"},
+    margins = {"constraint_margin": ("constraint", np.array([0.0, 0.01, 2e-9]))}
+    made = unchanged.design(chosen, path.parent, _history() | margins)
+    return made.assign_coords(
+        method=list(chosen.optimiser.methods.chosen),
+        constraint=["edge_length", "block_angle", "void_angle"],
+        constraint_units=("constraint", ["mm", "rad", "rad"]),
     )
 
 

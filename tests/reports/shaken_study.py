@@ -12,12 +12,14 @@ import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
+from pipeline.posing import network_variables, scene_of, unit_coordinates
 from pipeline.problem import Output, Problem
 from pipeline.problem.sections import HarmonicDrive, sweep_cases
 from pipeline.runtime import SweepResult
 from pipeline.stages import sweep as sweep_stage
 from reports.study import StudyResults, study_results
 from sim.structure import Lattice
+from tests.pipeline import unchanged
 from tests.pipeline.samples import filled
 from tests.reports import compressed_study
 
@@ -67,7 +69,7 @@ def constants(posed: Problem) -> xr.Dataset:
 def write(folder: Path, preset: str | None = None) -> list[Path]:
     """Write the datasets of all kinds; returns their paths."""
     chosen = problem.load(PROBLEM, preset)
-    lattice = _lattice(chosen)
+    lattice = chosen.lattice.network()
     paths = [folder / f"{kind}.nc" for kind in KINDS]
     about = provenance.of_study(chosen, "design")
     datasets.write(design(chosen, lattice), paths[0], "design", about)
@@ -89,39 +91,6 @@ def _drive(chosen: Problem) -> HarmonicDrive:
     return chosen.drive
 
 
-def _lattice(chosen: Problem) -> Lattice:
-    return chosen.lattice.network()
-
-
-def _flags(chosen: Problem) -> dict[str, Any]:
-    n_units = chosen.lattice.columns * chosen.lattice.rows
-    region, roi, support = (np.zeros(n_units, "int8") for _ in range(3))
-    source = problem.selected_units(_drive(chosen).units, chosen.lattice)
-    region[list(problem.cloak_units(chosen))] = 1
-    region[list(source)] = 2
-    roi[list(problem.interest_units(chosen))] = 1
-    support[list(problem.selected_units("corners", chosen.lattice))] = 1
-    support[list(source)] = 2
-    return {"region": ("unit", region), "roi": ("unit", roi), "support": ("unit", support)}
-
-
-def _network(lattice: Lattice) -> dict[str, Any]:
-    return {
-        "ligament_unit": (("ligament", "end"), lattice.ligament_units),
-        "ligament_vertex": (("ligament", "end"), lattice.ligaments % 4),
-    }
-
-
-def _labels(chosen: Problem, lattice: Lattice) -> dict[str, Any]:
-    return {
-        "unit": np.arange(lattice.n_units),
-        "i": ("unit", lattice.index[:, 0]),
-        "j": ("unit", lattice.index[:, 1]),
-        "xy": ["x", "y"],
-        "direction": ("case", np.degrees(_drive(chosen).directions)),
-    }
-
-
 def cloaked(chosen: Problem, lattice: Lattice) -> np.ndarray:
     """Vertices of a four-fold symmetric design: a harder turn of the units around the source."""
     ends = lattice.vertices[lattice.ligaments].mean(axis=1) - np.array(chosen.lattice.centre_site)
@@ -137,27 +106,13 @@ def cloaked(chosen: Problem, lattice: Lattice) -> np.ndarray:
 
 
 def design(chosen: Problem, lattice: Lattice) -> xr.Dataset:
+    margins = {"constraint_margin": ("constraint", np.array([0.0, 0.01, 2e-9, 0.3, 0.11]))}
     vertices = lattice.padded(cloaked(chosen, lattice))
-    return xr.Dataset(
-        _flags(chosen)
-        | _network(lattice)
-        | _histories(chosen)
-        | {
-            "vertices": (("unit", "vertex", "xy"), vertices),
-            "vertices_initial": (("unit", "vertex", "xy"), lattice.padded(lattice.vertices)),
-            "end_angles": (("ligament", "end"), np.full((lattice.n_ligaments, 2), np.nan)),
-            "centroid": (("unit", "xy"), np.nanmean(vertices, axis=1)),
-            "constraint_margin": ("constraint", np.array([0.0, 0.01, 2e-9, 0.3, 0.11])),
-            "smallest_gap": ((), 0.11),
-            "overlaps": ((), 0),
-        },
-        _labels(chosen, lattice)
-        | {
-            "method": ["sqp", "mma"],
-            "constraint": ["edge_length", "block_angle", "void_angle", "convexity", "gap"],
-            "constraint_units": ("constraint", ["mm", "rad", "rad", "rad", "mm"]),
-        },
-        {"shipped_method": "sqp"},
+    made = unchanged.design(chosen, PROBLEM.parent, _histories(chosen) | margins, vertices)
+    return made.assign_coords(
+        method=["sqp", "mma"],
+        constraint=["edge_length", "block_angle", "void_angle", "convexity", "gap"],
+        constraint_units=("constraint", ["mm", "rad", "rad", "rad", "mm"]),
     )
 
 
@@ -195,7 +150,8 @@ def response(chosen: Problem, lattice: Lattice) -> xr.Dataset:
     frequency = _drive(chosen).frequency
     time = np.linspace(0.0, chosen.response.cycles / frequency, chosen.response.samples)
     motion = np.stack([_motion(chosen, lattice, time, reach) for reach in REACH.values()])
-    roi = _flags(chosen)["roi"][1].astype(bool)
+    network = network_variables(chosen, scene_of(chosen, PROBLEM.parent))
+    roi = network["roi"][1].astype(bool)
     scaled = motion[..., roi, :] / np.array([lattice.spacing, lattice.spacing, 1.0])
     horizon = time <= chosen.horizon_time * (1 + 1e-9)
     power = (scaled**2).sum(axis=(-1, -2))[..., horizon]
@@ -211,8 +167,7 @@ def response(chosen: Problem, lattice: Lattice) -> xr.Dataset:
     constants |= dict.fromkeys(ABSENT, np.nan)
     return xr.Dataset(
         filled("response", sizes, **constants)
-        | _flags(chosen)
-        | _network(lattice)
+        | network
         | {
             "vertices": (("structure", "unit", "vertex", "xy"), np.stack(shapes)),
             "displacement": ((*per_time, "unit", "dof"), motion),
@@ -222,8 +177,9 @@ def response(chosen: Problem, lattice: Lattice) -> xr.Dataset:
             "loss_samples": (per_case, SAMPLES * loss),
             "loss_by_contact": (per_law, np.stack([loss, loss], axis=1)),
         },
-        _labels(chosen, lattice)
+        unit_coordinates(lattice)
         | {
+            "direction": ("case", np.degrees(_drive(chosen).directions)),
             "structure": ["altered", "cloaked"],
             "time": time,
             "dof": ["ux", "uy", "theta"],

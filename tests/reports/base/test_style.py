@@ -63,16 +63,12 @@ def test_oklab_is_inverted() -> None:
     np.testing.assert_allclose(style.srgb(style.oklab(rgb)), rgb, atol=1e-6)
 
 
-def test_the_font_is_the_one_that_matplotlib_ships() -> None:
-    with style.styled():
-        found = Path(findfont(FontProperties(family=mpl.rcParams["font.family"])))
-    assert found.resolve().is_relative_to(Path(mpl.get_data_path()).resolve())
-
-
-def test_style_ignores_the_settings_of_the_user() -> None:
+def test_style_ignores_the_settings_of_the_user_and_has_the_font_of_matplotlib() -> None:
     with mpl.rc_context({"axes.grid": True, "font.size": 30}), style.styled():
         assert not mpl.rcParams["axes.grid"]
         assert mpl.rcParams["font.size"] == style.TEXT
+        found = Path(findfont(FontProperties(family=mpl.rcParams["font.family"])))
+    assert found.resolve().is_relative_to(Path(mpl.get_data_path()).resolve())
 
 
 def test_axes_have_the_size_that_they_will_have_in_print() -> None:

@@ -4,11 +4,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from reports.facts import Fact, fact_records
+from pipeline import problem
+from reports.base import prose
+from reports.facts import Fact, checks, constants_facts, fact_records
 from reports.figures.shielding import monitored
 from reports.figures.shielding.facts import shielding_facts
 from reports.study import StudyResults
+from sim.constraints import Limits
+from sim.constraints.manufacturability import kinds
+from sim.structure import SlotRoom, quads
+from tests.pipeline.conftest import FIG2
 from tests.reports import shaken_study
 from tests.tables import cases
 
@@ -83,3 +90,33 @@ def test_files_hold_the_same_facts(tmp_path: Path, study: StudyResults) -> None:
         "key": "units", "label": "Units", "value": 225, "unit": "1", "ours": "15 × 15",
         "paper": "15 × 15", "note": "", "group": "Scene",
     }  # fmt: skip
+
+
+def test_every_kind_of_constraint_has_a_name() -> None:
+    room = SlotRoom(1.0, 5.0, 0.45, 0.8, 0.1)
+    limits = Limits(5.0, 0.5, True, 0.0, 0.2, room, 0.5)
+    assert None not in (getattr(limits, name) for name in Limits.__dataclass_fields__)
+    found = {kind.name for kind in kinds(quads(3, 3, 15.0, 2.25, np.deg2rad(20.0)), limits)}
+    told = prose(checks.__file__)
+    assert {f"margin_{name}" for name in found} == {
+        key for key in told if key.startswith("margin_")
+    }
+
+
+def losses(cloaked: list[float], altered: list[float]) -> xr.Dataset:
+    """Of draws of measured constants."""
+    status = np.where(np.isfinite(cloaked), "ok", "no equilibrium")
+    named = {"loss": cloaked, "loss_altered": altered, "status": status}
+    return xr.Dataset({name: ("case", values) for name, values in named.items()})
+
+
+def test_mean_and_interval_over_measured_constants_leave_failed_draws_out() -> None:
+    asked, made = problem.load(FIG2), losses([0.1, 0.2, np.nan], [1.0, 1.0, np.nan])
+    start, end, gain = constants_facts(asked, made, (1.0, 0.1))
+    np.testing.assert_allclose([start.value, end.value, gain.value], [1.0, 0.15, 85.0])
+    assert end.ours == "0.15 (0.103 to 0.198)"
+    assert end.note == "nominal 0.1; mean and 95 % of 3 draws, 1 of them failed"
+    assert gain.note.startswith("nominal 90.0 %")
+    assert list(constants_facts(asked, None, (1.0, 0.1))) == []
+    (only,) = constants_facts(asked, losses([np.nan], [np.nan]), (1.0, 0.1))
+    assert (only.ours, only.note) == ("none", "no equilibrium")

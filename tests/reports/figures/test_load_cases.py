@@ -9,16 +9,13 @@ from matplotlib.figure import Figure
 
 from pipeline import problem
 from reports.facts import Fact
-from reports.figures.loading_path import (
-    abscissa,
-    curves,
-    facts,
-    measures,
-    snapshot_grid,
-    tables,
-)
+from reports.figures.loading_path import abscissa, curves, facts, measures, snapshot_grid, tables
 from reports.study import StudyResults
 from tests.reports.compressed_study import SHIELD, written
+from tests.tables import cases
+
+FIG4 = Path(__file__).parents[3] / "experiments/fig4/problem.yaml"
+PATH = abscissa.Abscissa("displacement", "u", "mm", np.array([0.0, 15.0]), True, None, (0, 1))
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +67,15 @@ def test_each_load_case_has_snapshots_and_a_curve_of_its_own(two: StudyResults) 
     assert (one.get_color(), one.get_linestyle()) != (other.get_color(), other.get_linestyle())
     once, thrice = (np.asarray(line.get_ydata(), dtype=float) for line in (one, other))
     np.testing.assert_allclose(thrice, 3 * once)
+
+
+@cases("reports", "degrees, labels")
+def test_a_drive_of_the_right_column_is_named(
+    degrees: tuple[float, ...], labels: list[str]
+) -> None:
+    """The kind of strain, by the direction of the drive and its side."""
+    asked = problem.load(FIG4)
+    drive = asked.drive.model_copy(update={"directions": tuple(np.radians(degrees))})
+    found = list(facts.strain_facts(asked.model_copy(update={"drive": drive}), PATH))
+    assert [fact.label for fact in found] == labels
+    assert [fact.value for fact in found] == pytest.approx([100 * 15.0 / 210.0] * len(found))

@@ -1,8 +1,10 @@
 import base64
+import csv
 import dataclasses
 import json
 import re
 from html.parser import HTMLParser
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -120,6 +122,16 @@ def test_words_of_a_problem_are_escaped(quick: StudyResults) -> None:
     data = re.search(r'id="player-data">(.*?)</script>', html, re.DOTALL)
     assert data is not None
     assert json.loads(data[1])["cases"][0].startswith("α")
+
+
+def test_a_text_that_looks_like_a_formula_is_a_text() -> None:
+    """A spreadsheet computes no cell."""
+    words = ["=1+1", "@a", "+cmd", "-5 mm", "−5 mm", "a=b", "-1e-3", "", "=HYPERLINK(1)"]
+    table = Table("t.csv", "", {"word": words, "number": np.linspace(-1.0, 1.0, len(words))})
+    rows = list(csv.reader(StringIO(table.csv.decode())))
+    shown = ["'=1+1", "'@a", "'+cmd", "'-5 mm", "−5 mm", "a=b", "-1e-3", "", "'=HYPERLINK(1)"]
+    assert [row[0] for row in rows[1:]] == shown
+    assert rows[1][1] == "-1"
 
 
 def test_cells_of_a_table() -> None:
