@@ -9,14 +9,16 @@ import pytest
 from benchmarks import suites
 from benchmarks.harness import errors
 from benchmarks.methods import jax_baseline
+from benchmarks.picture import PAGE, TableRow, figure, tables
 from benchmarks.scenes import paper_scenes
+from reports.base import style
 from sim.core import Floats
 from sim.energy import gradient, kinematics_of, system_of
 from sim.scene import concrete_parameters, parameters_of_design
 from sim.solvers import Harmonic
 
 COMPILED = ("compilation", "fresh factors")
-"""Those that compile every loop anew, minutes each: tests/slow/test_ablation.py tries them."""
+"""Those that compile every loop anew, minutes each: tests/slow/test_benchmarks.py tries them."""
 
 
 @pytest.mark.parametrize(
@@ -76,3 +78,21 @@ def test_the_baseline_has_the_same_forces() -> None:
     made = parameters_of_design(scene)(jnp.zeros(scene.space.n_variables))
     theirs = jax_baseline.force(scene)(made, jnp.asarray(motion.reshape(-1, 3)))
     np.testing.assert_allclose(np.ravel(theirs), ours, atol=1e-12 * np.abs(ours).max())
+
+
+def test_the_tables_are_read_whole() -> None:
+    found = tables(PAGE.read_text(encoding="utf-8"))
+    wanted = {"fig2": 4, "fig4": 3, "precision": 7, "warm": 2, "static": 6}
+    assert {name: len(rows) for name, rows in found.items()} == wanted
+    assert found["fig2"][0] == TableRow("ours", 0.443, 3.9e-05)
+
+
+def test_the_picture_shows_them() -> None:
+    found = tables(PAGE.read_text(encoding="utf-8"))
+    with style.styled():
+        left, right = figure(found).axes
+    ends = [bar.get_path().get_extents(bar.get_transform()) for bar in left.patches]
+    times = left.transData.inverted().transform([[end.x1, end.y1] for end in ends])[:, 0]
+    np.testing.assert_allclose(times, [34.5, 0.00907, 399.0, 0.202, 0.443])
+    shown = np.concatenate([np.asarray(line.get_xydata()) for line in right.lines])
+    assert set(map(tuple, shown)) == {(row.time, row.error) for row in found["precision"]}

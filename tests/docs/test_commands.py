@@ -1,8 +1,7 @@
 """No page tells a command that there is not: every one is run, or planned as far as it can be.
 
-Pages that are walked through (tests/slow/test_draft_pages.py, tests/slow/test_pages.py) have all
-commands run. Of every other page, targets are planned by make and by Snakemake, and the options of
-stages are read by their own parsers.
+Pages that are walked through (tests/slow/test_pages.py) have all commands run. Of every other page,
+targets are planned by make and by Snakemake, and the options of stages are read by their parsers.
 """
 
 import argparse

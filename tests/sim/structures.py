@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import jax
@@ -29,7 +29,7 @@ from sim.structure import (
 NONE = np.array([], dtype=np.int64)
 RING = np.array([6, 7, 8, 11, 13, 16, 17, 18])
 """The units around the middle of 5 x 5."""
-LEFT = 5 * np.arange(5)
+LEFT, CORNERS, MIDDLE = 5 * np.arange(5), np.array([0, 4, 20, 24]), np.array([12])
 
 
 def pressed(depth: float, **changes: Any) -> sim.Scene:  # noqa: ANN401  (fields of a scene)
@@ -141,43 +141,26 @@ def hand_made(polygons: list[Floats], ligaments: Ints) -> sim.Lattice:
 
 
 class Numbers(NamedTuple):
-    """Everything that a response may be differentiated by.
+    """Everything that a response may be differentiated by."""
 
-    Attributes:
-        design: (n_variables,) mm.
-        stiffness: (n_ligaments, 3) factors on axial, shear and bending stiffness.
-        contact: (n_ligaments,) factors on the contact stiffness.
-        density: factor.
-        damping: (n_units, 2) factors on translational and rotational damping.
-        drive: the motion, itself a tree of numbers.
-    """
-
-    design: Array
-    stiffness: Array
-    contact: Array
-    density: Array
-    damping: Array
-    drive: sim.MotionLaw
+    design: Array  # (n_variables,) mm
+    stiffness: Array  # (n_ligaments, 3) factors on axial, shear and bending stiffness
+    contact: Array  # (n_ligaments,) factors on the contact stiffness
+    density: Array  # factor
+    damping: Array  # (n_units, 2) factors on translational and rotational damping
+    drive: sim.MotionLaw  # itself a tree of numbers
 
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """A small structure, clamped and driven, all of whose numbers can be varied.
+    """A small structure, clamped and driven, all of whose numbers can be varied."""
 
-    Attributes:
-        lattice: the network; every vertex but those of the driven units is a design variable.
-        clamped, driven: units.
-        motion: of the driven units.
-        distance: activation distance of contact between units, mm; None for that on void angles.
-        control: (n_driven, 3) which dofs of the driven units are displaced, loaded or free.
-    """
-
-    lattice: sim.Lattice
-    clamped: Ints
+    lattice: sim.Lattice  # every vertex but those of the driven units is a design variable
+    clamped: Ints  # units
     driven: Ints
-    motion: sim.MotionLaw
-    distance: float | None = None
-    control: Ints | None = None
+    motion: sim.MotionLaw  # of the driven units
+    distance: float | None = None  # within which units touch, mm; None for contact on void angles
+    control: Ints | None = None  # (n_driven, 3) which dofs are displaced, loaded or free
 
     @cached_property
     def space(self) -> DesignSpace:
@@ -230,7 +213,12 @@ class Rig:
     @property
     def values(self) -> Parameters:
         """Parameters of the initial structure as NumPy arrays."""
-        return Parameters(*(np.asarray(part) for part in self.parameters(self.numbers)))
+        return self.values_of(self.numbers.design)
+
+    def values_of(self, design: Array | Floats) -> Parameters:
+        """Parameters of another design (n_variables,), mm."""
+        made = self.parameters(self.numbers._replace(design=jnp.asarray(design)))
+        return Parameters(*map(np.asarray, made))
 
     @property
     def drive(self) -> sim.PrescribedMotion:
@@ -244,6 +232,22 @@ class Rig:
         drive = self.driven_by(numbers.drive)
         response = differentiable_motion(solver, self.parameters(numbers), (drive,))
         return uneven_loss(response.displacement, response.velocity)
+
+
+@cache
+def squeezed(
+    depth: float, side: int = 5, bias_deg: float = 20.0, distance: float | None = None
+) -> Rig:
+    """Squares between plates, of which one moves in."""
+    left, drive = side * np.arange(side), sim.LinearRamp(-depth, 1.0)
+    return Rig(rotating_squares(side, bias_deg), left, left + side - 1, drive, distance)
+
+
+@cache
+def shaken(amplitude: float = 2.0, bias_deg: float = 20.0, distance: float | None = None) -> Rig:
+    """5 x 5 squares, the corners clamped, the middle shaken at 150 Hz from some 3 ms on."""
+    motion = sim.Harmonic(amplitude, 150.0, 0.6, rise=0.0015, delay=0.003)
+    return Rig(rotating_squares(5, bias_deg), CORNERS, MIDDLE, motion, distance)
 
 
 def uneven_loss(displacement: Array | Floats, velocity: Array | Floats) -> Array:

@@ -1,5 +1,6 @@
 """The public face of sim: what it loads, what it gives, and what JAX may do with it."""
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,6 +16,8 @@ import pytest
 
 import sim
 from tests.sim.structures import central, pressed
+
+EXAMPLE = Path(__file__).parents[2] / "docs/example_sim.py"
 
 
 def run(script: str, *arguments: str) -> str:
@@ -49,6 +52,26 @@ def test_any_room_of_sim_switches_to_float64() -> None:
     rooms = sorted(f"sim.{path.parent.name}" for path in Path("sim").glob("*/__init__.py"))
     assert len(rooms) > 8
     assert run(script, *rooms) == ""
+
+
+def test_the_example_lowers_its_loss() -> None:
+    """As it is printed in docs/."""
+    told = run(EXAMPLE.read_text())
+    # the plan above names an allowed loss error, too
+    before, after = map(float, re.findall(r"loss (\d\.\d+)", told.splitlines()[-1]))
+    assert before == pytest.approx(0.0467, abs=1e-4)
+    assert after == pytest.approx(0.0023, abs=2e-4)
+    force = float(re.findall(r"drive (\d\.\d+) N", told)[0])
+    assert force == pytest.approx(3.759, abs=2e-3)
+
+
+def test_the_example_is_short_and_needs_sim_alone() -> None:
+    text = EXAMPLE.read_text()
+    code = [line for line in text.splitlines() if line.strip()]
+    assert len(code) <= 40
+    assert "sim.simulate(" in "".join(code[:20])
+    imported = set(re.findall(r"^(?:from|import) (\w+)", text, re.MULTILINE))
+    assert imported == {"numpy", "sim"}
 
 
 @cache

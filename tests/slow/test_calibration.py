@@ -13,13 +13,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 import xarray as xr
+import yaml
 
+from pipeline import datasets
+from pipeline.__main__ import run_stage
 from pipeline.calibration import computed_sets, computed_track, estimates, fit_uncertainty, inputs
 from pipeline.calibration.experiments import Experiment, force_displacement, free_decay, full_field
 from pipeline.calibration.fit_constants import fit_settled
 from pipeline.calibration.least_squares import FitModel
 from pipeline.runtime import ROOT
 from sim.core import Floats
+from tests.pipeline.calibration import test_loads
 from tests.pipeline.calibration.specimens import (
     STIFFNESS,
     TRUTH,
@@ -27,6 +31,8 @@ from tests.pipeline.calibration.specimens import (
     described,
     force_sets,
     loaded,
+    synthesised,
+    written,
 )
 
 SPECIMENS = ROOT / "experiments/calibration/specimens"
@@ -187,3 +193,51 @@ def test_a_track_of_little_noise_tells_constants_within_1_percent(
     middle = np.sqrt(estimate.low * estimate.high)[: len(made.asked.fit)]
     true = np.exp(made.true.logs(made.asked.fit))
     np.testing.assert_allclose(middle, true, rtol=0.01)
+
+
+def test_the_load_cell_of_a_track_tells_the_scale(tmp_path: Path) -> None:
+    shutil.copy(test_loads.SPECIMENS / "squeezed.yaml", tmp_path)
+    path = synthesised(
+        tmp_path, described([test_loads.track()], test_loads.WANTED, material=test_loads.START)
+    )
+    file = tmp_path / "data/motion.nc"
+    seen = datasets.read(file, "track")
+    seen["load_force"] += 0.3
+    datasets.write(seen, file, "track", seen.attrs)
+    found = test_loads.found_from(path, tmp_path)
+    test_loads.assert_inside(found, {"shear_stiffness": 1.19, "bending_stiffness": 1.5})
+    assert (found["standard_error"] < 0.1).all()
+    assert found["newton_step"] < 0.05
+
+
+SPECIMEN = ROOT / "experiments/calibration/specimens/squeezed.yaml"
+TRACK = """
+{ kind: track, name: motion, problem: squeezed.yaml, structure: altered, every: 2,
+  virtual: { rate: 8 Hz, noise: { displacement: 0.002 mm, rotation: 0.01 deg },
+             bias: { displacement: 0.05 mm, rotation: 0.2 deg } } }
+"""
+
+
+def test_ratios_of_stiffness_from_motion_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(SPECIMEN, tmp_path / "squeezed.yaml")
+    track = yaml.safe_load(TRACK)
+    start = TRUTH | {"bending_stiffness": "1.8 N mm/rad"}
+    text = described([track], ["bending_stiffness", "damping_ratio"], material=start)
+    path = written(tmp_path, text)
+    folder, out = tmp_path / "data", tmp_path / "found.nc"
+    words = ["synthesise", str(path), "--out-dir", str(folder), "--quiet"]
+    assert run_stage("calibrate", words) == 0
+    assert datasets.read(folder / "motion.nc", "track").attrs["synthetic"] == "yes"
+    assert run_stage("calibrate", [str(folder / "calibration.yaml"), "--out", str(out)]) == 0
+    found = datasets.read(out, "calibration")
+    bending = found.isel(parameter=0)
+    assert bending["lower"] < 1.5 < bending["upper"]
+    assert bending["standard_error"] < 0.25
+    assert found["newton_step"] < 0.05
+    assert "ratio: 0.0186  # not determined" in (tmp_path / "found.yaml").read_text()
+    assert "damping_ratio is not determined by these data" in capsys.readouterr().err
+    assert np.unique(found["channel"]).tolist() == [
+        3 * unit + dof for unit in (1, 2, 5, 6, 9, 10, 13, 14) for dof in range(3)
+    ]

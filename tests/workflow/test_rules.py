@@ -176,3 +176,68 @@ def test_clean_removes_what_was_built_and_nothing_else(built: Sandbox) -> None:
     assert ended.returncode == 0, ended.stderr
     assert not (built.root / "results").exists()
     assert built.problem.exists()
+
+
+MEASURED = """\
+spacing: 15 mm
+material:
+  density: 6.18 kg/m^2
+  axial_stiffness: 120 N/mm
+  shear_stiffness: 1.2 N/mm
+  bending_stiffness: 1.5 N mm/rad
+  damping: {ratio: 0.02}
+fit: [damping_ratio]
+data: [{kind: free_decay, name: decay, file: decay.csv}]
+"""
+
+
+def test_only_what_is_virtual_is_computed_first(sandbox: Sandbox) -> None:
+    folder = sandbox.root / "experiments/calibration"
+    virtual = len(list(folder.glob("*.yaml")))
+    (folder / "mine.yaml").write_text(MEASURED)
+    (folder / "decay.csv").write_text("time (s),angle (deg)\n")
+    planned = sandbox.planned("calibrate")
+    assert planned["calibrate_synthesise"] == virtual > 0
+    assert planned["calibrate_fit"] == planned["calibration_figure"] == virtual + 1
+
+
+def leave(sandbox: Sandbox, text: str, video: str = "run1.mp4") -> None:
+    """Leaves one recording, of a video beside it."""
+    folder = sandbox.root / "experiments/fig2/recordings"
+    for path in folder.iterdir():
+        path.unlink()
+    (folder / "run1.yaml").write_text(text, encoding="utf-8")
+    (folder / video).write_bytes(b"video")
+
+
+def test_virtual_recordings_are_rendered_and_tracked(sandbox: Sandbox) -> None:
+    planned = sandbox.planned("fig2_recordings")
+    count = len(list((sandbox.root / "experiments/fig2/recordings").glob("*.yaml")))
+    assert planned["film_render"] == planned["track"] == planned["track_report"] == count > 0
+    assert planned["virtual_specimen"] == count
+    assert not {"simulate", "film_weigh"} & planned.keys()
+    planned = sandbox.planned("fig4_recordings")  # with a virtual load cell
+    assert planned["film_weigh"] == planned["virtual_specimen"] == planned["track"] == 2
+
+
+def test_a_video_that_is_dropped_in_is_tracked(sandbox: Sandbox) -> None:
+    """It may bring its own design."""
+    tracked, folder = {"track": 1, "track_report": 1, "fig2_recordings": 1}, "fig2/recordings"
+    leave(sandbox, "video: run1.mp4\nload_cell: {file: load.csv}\n")
+    (sandbox.root / "experiments" / folder / "load.csv").write_text("time,force\n")
+    assert sandbox.planned("fig2_recordings") == tracked | {"design": 2, "select": 1}
+    leave(sandbox, "video: run1.mp4\ndesign: own.nc\n")
+    (sandbox.root / "experiments" / folder / "own.nc").write_bytes(b"design")
+    assert sandbox.planned("fig2_recordings") == tracked
+
+
+def test_files_beside_a_recording_may_have_spaces(built: Sandbox) -> None:
+    names = ("run 1 (grün).mp4", "it's mine.nc", "load $1.csv")
+    text = 'video: "{}"\ndesign: "{}"\nload_cell: {{file: "{}"}}\n'
+    leave(built, text.format(*names), names[0])
+    for name in names[1:]:
+        (built.root / "experiments/fig2/recordings" / name).write_bytes(b"held")
+    ended = built.run("results/fig2/recordings/run1/track.nc")
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    told = (built.root / "results/fig2/recordings/run1/track.nc").read_text()
+    assert names[1] in told

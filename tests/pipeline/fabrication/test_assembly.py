@@ -7,14 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 
 from pipeline import problem
 from pipeline.fabrication.checks.package_check import page_words
 from pipeline.fabrication.papers import read_bill, write_assembly_sheet, write_bill, write_manifest
-from pipeline.fabrication.papers.assembly_plan import OVERLAP, tiles
-from pipeline.fabrication.papers.pdf_paper import SIZES, room
+from pipeline.fabrication.papers.assembly_plan import _DIGIT, _NUMBER, OVERLAP, number_places, tiles
+from pipeline.fabrication.papers.pdf_paper import POINT, SIZES, room
 from pipeline.fabrication.parts import BuiltSpecimen
 from pipeline.fabrication.plates import PrintEstimate
+from sim.core import Floats
 from tests.pipeline.fabrication import handmade
 from tests.pipeline.fabrication.handmade import ASKED
 
@@ -145,3 +147,32 @@ def test_pages_have_the_size_that_is_asked_for(tmp_path: Path, paper: str, width
     path = tmp_path / "assembly.pdf"
     write_assembly_sheet(path, handmade.specimen(), ASKED.model_copy(update={"paper": paper}))
     assert b"/MediaBox [ 0 0 " + width in path.read_bytes()
+
+
+SIZE = (3.4, 2.4)
+
+
+def test_a_digit_is_high_enough_on_paper() -> None:
+    assert _DIGIT[1] * _NUMBER / POINT >= 1.8
+
+
+@pytest.mark.parametrize("spacing", [2.0, 5.0])
+def test_numbers_of_close_shims_cover_neither_each_other_nor_ids(spacing: float) -> None:
+    middles = {k: np.array([spacing * (k % 3), spacing * (k // 3)]) for k in range(9)}
+    paths = {k: np.add(middle, [[-1.0, 0.0], [1.0, 0.0]]) for k, middle in middles.items()}
+    taken = [(-2.0, 0.5, 2.0, 2.5)]
+    found = number_places(middles, dict.fromkeys(middles, SIZE), paths, taken)
+    boxes = [box_around(np.array(spot)) for spot in found.values()] + [shapely.box(*taken[0])]
+    shared = [a.intersection(b).area for k, a in enumerate(boxes) for b in boxes[:k]]
+    assert max(shared) < 1e-9
+    if spacing == 5.0:  # with room each stands by its own shim, on the line of no other
+        for number, spot in found.items():
+            assert np.linalg.norm(np.array(spot) - middles[number]) < 3.0
+            box = box_around(np.array(spot))
+            lines = (shapely.LineString(path) for k, path in paths.items() if k != number)
+            assert not any(line.intersects(box) for line in lines)
+
+
+def box_around(spot: Floats) -> shapely.Polygon:
+    half = np.array(SIZE) / 2
+    return shapely.box(*(spot - half), *(spot + half))

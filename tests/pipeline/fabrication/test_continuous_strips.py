@@ -1,11 +1,11 @@
-"""Continuous strips run along rows and columns, and end where a void begins."""
+"""Continuous strips end where a void begins; clamps are closed solids."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pipeline.fabrication.fixtures import strip_parts
+from pipeline.fabrication.fixtures import fixtures, strip_parts
 from pipeline.fabrication.fixtures.flat_fixtures import strips
 from pipeline.fabrication.parts import BuiltSpecimen
 from tests.pipeline.fabrication import handmade
@@ -41,3 +41,16 @@ def test_a_row_that_a_void_interrupts_has_two_strips(monkeypatch: pytest.MonkeyP
     assert [name for name in found if name.startswith("ROW")] == ["ROW1-1", "ROW1-2", "ROW2"]
     left, right = found["ROW1-1"], found["ROW1-2"]
     assert left[:, 0].max() < 2 * handmade.SPACING < right[:, 0].min()
+
+
+def test_jaws_stand_back_from_the_rim() -> None:
+    specimen = handmade.specimen()
+    parts = {part.id: part for part in fixtures(specimen, handmade.ASKED, handmade.SPACING)}
+    clamps = [
+        part for name, part in parts.items() if name.startswith("CLAMP") and "LID" not in name
+    ]
+    assert clamps
+    for clamp in clamps:
+        _, base, jaws = (layer.area for layer in clamp.layers)
+        assert base.contains(jaws)
+        assert base.boundary.distance(jaws) > 0.01

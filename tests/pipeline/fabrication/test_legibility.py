@@ -1,13 +1,20 @@
 """Ids are read back from their strokes, from the top and from below, also where slots cut them."""
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely import LineString, MultiLineString, Polygon, box
+from shapely import LineString, MultiLineString, MultiPolygon, Polygon, box
 
+from pipeline.fabrication.checks.assembled_specimen import unit_sections
+from pipeline.fabrication.checks.package_record import ExpectedParts
+from pipeline.fabrication.checks.slot_checks import UnitSection, check_section
 from pipeline.fabrication.engraving import orientation_mark, place_id, text_strokes, transformed
-from pipeline.fabrication.parts import Strokes, unit_solid
+from pipeline.fabrication.parts import Strokes, UnbuildableUnitError, unit_solid
+from pipeline.fabrication.readback import MeshBody
 from pipeline.problem.sections import Fabrication, Labels
 from tests.pipeline.fabrication import slender
 from tests.pipeline.fabrication.stroke_reader import read
@@ -88,3 +95,35 @@ def test_the_id_of_a_slender_unit_is_read_on_both_sides(name: str) -> None:
     sunk = unit.outline.difference(unit_solid(unit, Fabrication()).layers[1].area)
     lines = MultiLineString([LineString(stroke) for stroke in unit.underside])
     assert sunk.covers(lines.intersection(unit.outline.buffer(-0.2, join_style="mitre")))
+
+
+SETTINGS = Fabrication()
+
+
+@pytest.mark.parametrize("name", slender.UNITS)
+def test_a_slender_unit_is_built_without_a_fault(name: str) -> None:
+    unit, data = slender.built(name), slender.UNITS[name]
+    vertices = [vertex for vertex, *_ in data["slots"]]
+    shape = UnitSection(unit.label, slender.FILE, unit.design, unit.outline, vertices)
+    assert [fault.what for fault in check_section(shape, SETTINGS)] == []
+    gaps = [unit.outline.distance(Polygon(ring)) for ring in data["neighbours"]]
+    assert min(gaps, default=1.0) >= SETTINGS.minimum_gap - 1e-4
+
+
+def test_a_unit_that_grew_to_twice_its_size_is_found_in_its_place() -> None:
+    """Less than half of it covers its design."""
+    thin, beside = Polygon([(0, 0), (9, 0), (9, 1), (0, 1)]), Polygon([(0, 4), (9, 4), (9, 9)])
+    grown = thin.buffer(1.0, join_style="mitre")
+    solid = SimpleNamespace(section=lambda _height: MultiPolygon([beside, grown]))
+    expected = ExpectedParts({"A1": thin, "A2": beside}, ())
+    sections = unit_sections(cast("MeshBody", solid), expected, SETTINGS)
+    assert sections["A1"].equals(grown)
+    assert sections["A2"].equals(beside)
+
+
+def test_a_unit_without_room_for_its_id_carries_a_letter() -> None:
+    name = next(name for name, data in slender.UNITS.items() if data["label"] == "AD15")
+    assert slender.built(name).letter == "A"
+    assert slender.built(name, letters="YV").letter == "Y"
+    with pytest.raises(UnbuildableUnitError, match="no room for the id of unit AD15"):
+        slender.built(name, letters="")

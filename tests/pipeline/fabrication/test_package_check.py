@@ -5,17 +5,21 @@ import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 import numpy as np
 import pytest
 import trimesh
+from ezdxf.filemanagement import readfile
 
 from pipeline.datasets import file_hash
 from pipeline.fabrication.checks import check_package, laser_folder, package_record
 from pipeline.fabrication.checks.assembled_specimen import unit_sections
 from pipeline.fabrication.checks.bill_checks import check_bill
 from pipeline.fabrication.checks.package_record import PackageRecord, expected_parts
+from pipeline.fabrication.files.drawing_files import write_dxf
 from pipeline.fabrication.papers import BILL, MANIFEST, read_bill
+from pipeline.fabrication.plates import LaserSheet
 from pipeline.fabrication.readback import Drawing, read_drawing, read_stl
 from pipeline.problem import Problem
 from pipeline.problem.fields import SIM_UNITS
@@ -23,6 +27,7 @@ from pipeline.problem.sections import Fabrication
 from pipeline.runtime import UserError
 from tests.pipeline.fabrication import built
 from tests.pipeline.fabrication.files import write_stl
+from tests.tables import tables
 
 UNITS = "laser/units_sheet1_nominal"
 KERF = "laser/units_sheet1_kerf0.15"
@@ -234,3 +239,23 @@ def test_the_bill_says_which_files_hold_each_unit_and_shim(whole: tuple[Path, Pr
     files = [row["files"].split() for row in rows]
     assert all(files)
     assert all((whole[0] / name).is_file() for names in files for name in names)
+
+
+DxfVersion: TypeAlias = Literal["R2010", "R12"]
+
+OPTIONS: dict[str, dict[str, object]] = tables("fabrication")["options"]
+
+
+@pytest.mark.parametrize("version", ["R2010", "R12"])
+def test_a_drawing_says_how_far_it_extends(tmp_path: Path, version: DxfVersion) -> None:
+    write_dxf(LaserSheet("empty", (600.0, 300.0), ()), tmp_path / "empty.dxf", version)
+    header = readfile(tmp_path / "empty.dxf").header
+    assert tuple(header["$EXTMIN"])[:2] == (0.0, 0.0)
+    assert tuple(header["$EXTMAX"])[:2] == (600.0, 300.0)
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_other_parameters_make_a_right_package(tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "cloaked"
+    asked = built.write(folder, OPTIONS[name]).fabrication
+    check_package(folder, built.design(), "cloaked", asked, tmp_path / "faults")

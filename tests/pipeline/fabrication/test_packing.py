@@ -3,7 +3,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely import STRtree, box
 
-from pipeline.fabrication.plates import TooLargeError, pack
+from pipeline.fabrication.parts import Layer, PrintedPart
+from pipeline.fabrication.plates import STRAND, TooLargeError, estimate_print, pack
 
 SHEET, MARGIN, GAP = (100.0, 60.0), 5.0, 2.0
 lengths = st.floats(0.5, 50.0)
@@ -34,3 +35,33 @@ def test_part_larger_than_a_sheet_is_named() -> None:
     with pytest.raises(TooLargeError) as caught:
         pack([(10.0, 10.0), (91.0, 10.0)], SHEET, MARGIN, GAP)
     assert caught.value.part == 1
+
+
+def block(side: float, height: float = 6.0) -> PrintedPart:
+    return PrintedPart("A1", (Layer(box(0.0, 0.0, side, side), 0.0, height),))
+
+
+def test_a_solid_block_takes_its_volume() -> None:
+    found = estimate_print([block(30.0)], 1.0)
+    assert found.filament * STRAND == pytest.approx(30.0**2 * 6.0, rel=0.01)
+
+
+def test_infill_saves_what_is_far_from_top_and_bottom() -> None:
+    """Inside three perimeters, but for three layers of 0.3 mm at both ends."""
+    inside = (30.0 - 6 * 0.3856) ** 2 * (6.0 - 6 * 0.3)
+    solid, sparse = (estimate_print([block(30.0)], share) for share in (1.0, 0.25))
+    saved = (solid.filament - sparse.filament) * STRAND
+    assert saved == pytest.approx(0.75 * inside, rel=0.01)
+    assert sparse.seconds < solid.seconds
+
+
+@pytest.mark.parametrize("side", [0.3, 1.0, 2.2])
+def test_a_part_without_an_inside_is_its_perimeters(side: float) -> None:
+    one, other = (estimate_print([block(side)], share) for share in (0.0, 1.0))
+    assert one == other
+    assert one.seconds > 0.0
+
+
+def test_a_plate_takes_what_its_parts_take() -> None:
+    one, two = estimate_print([block(10.0)], 0.5), estimate_print([block(10.0)] * 2, 0.5)
+    assert two == pytest.approx((2 * one.seconds, 2 * one.filament))

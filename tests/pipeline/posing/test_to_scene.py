@@ -1,4 +1,4 @@
-"""Problems that can be read but have no meaning: one message, whatever stage meets them."""
+"""Problems that have no meaning, designs that cannot be made: one message, with the place."""
 
 from pathlib import Path
 
@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from pipeline.__main__ import run_stage
-from pipeline.posing import scene_of
+from pipeline.posing import failures, limits_of, scene_of
 from pipeline.posing.to_scene import contact_laws
 from pipeline.problem.reading import load
+from sim.constraints import ConstraintVector
+from sim.optimise import InfeasibleStartError
 from sim.structure import VoidAngleContact
-from tests.pipeline.static import SHIELD, write
+from tests.pipeline.static import HOLE, SHIELD, write
 from tests.tables import cases, refused
 
 SERIES = "{ kind: time_series, units: right, file: push.csv }"
@@ -69,3 +71,25 @@ def test_a_measured_drive_that_cannot_be_meant(
     series = "".join(f"{row},0,0\n" for row in rows.splitlines())
     (tmp_path / "push.csv").write_text(f"time (s),ux (mm),uy (mm),theta (rad)\n{series}")
     assert what in design(path, tmp_path / "design.nc", capfd)
+
+
+def test_an_infeasible_start_names_unit_and_vertex(tmp_path: Path) -> None:
+    """And an edge by its ends."""
+    path = write(tmp_path, HOLE, size=5)
+    scene = scene_of(problem := load(path), tmp_path)
+    constraints = ConstraintVector(scene.space, limits_of(problem))
+    values = constraints.values(np.zeros(scene.space.n_variables))
+    for number in (0, len(values) - 1):
+        error = InfeasibleStartError(number, 0.5)
+        told = failures.infeasible_start(error, constraints, path)
+        kind, where = constraints.named(number)
+        assert told.key == f"constraints.{'convex' if kind == 'convexity' else kind}"
+        assert where in told.what
+        assert where.startswith("vertex ")
+        assert " of unit [" in where
+    longer = np.zeros(scene.space.n_variables)
+    longer[:2] = 4.0
+    changed = np.flatnonzero(constraints.values(longer) != constraints.values(0 * longer))
+    vertex = np.flatnonzero(scene.lattice.group == scene.space.groups[0])[0]
+    i, j = scene.lattice.index[scene.lattice.unit[vertex]]
+    assert f"of unit [{i}, {j}]" in constraints.named(int(changed[0]))[1]

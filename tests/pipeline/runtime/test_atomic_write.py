@@ -3,7 +3,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-from pipeline.runtime import write_atomically
+import pytest
+
+from pipeline.runtime import CaseLog, SweepResult, case_log, write_atomically
 from tests.tables import refused
 
 OTHER = """
@@ -46,3 +48,39 @@ def test_a_folder_that_is_a_file_is_told(tmp_path: Path) -> None:
         write_atomically(tmp_path / "file/out.txt"),
     ):
         pass
+
+
+FOUND = {
+    number: SweepResult(number / 7, 1.0, -number / 9, "ok, more or less") for number in range(5)
+}
+
+
+def test_a_damaged_line_is_computed_again_and_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "part_0.csv"
+    with CaseLog(path, ["drive.frequency", "lattice, in words"]) as book:
+        book.add((number, [f"{number} Hz", "a, b"], found) for number, found in FOUND.items())
+    assert case_log.known(tmp_path) == FOUND
+    text = path.read_text(encoding="utf-8")
+    lines = text.splitlines(keepends=True)
+    for at in range(1, len(lines)):
+        damaged = lines[at].replace("1.0", "1.5")
+        path.write_text("".join([*lines[:at], damaged, *lines[at + 1 :]]), encoding="utf-8")
+        assert case_log.known(tmp_path) == {k: each for k, each in FOUND.items() if k != at - 1}
+    path.write_bytes(text.encode()[:-20])
+    assert case_log.known(tmp_path) == {k: each for k, each in FOUND.items() if k != 4}
+
+
+@pytest.mark.parametrize("setting", ["1 Hz", "10 Hz"])
+def test_what_a_kill_left_of_a_line_is_cut_off_and_nothing_else(
+    tmp_path: Path, setting: str
+) -> None:
+    path = tmp_path / "part_0.csv"
+    with CaseLog(path, ["drive.frequency"]) as book:
+        book.add([(0, [setting], FOUND[0])])
+    whole = path.read_bytes()
+    path.write_bytes(whole + b"1,unfinish")
+    with CaseLog(path, ["drive.frequency"]) as book:
+        book.add([(1, [setting], FOUND[1])])
+    assert path.read_bytes().startswith(whole)
+    assert path.read_bytes().count(b"\n") == whole.count(b"\n") + 1
+    assert case_log.known(tmp_path) == {k: FOUND[k] for k in (0, 1)}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sim.core import Floats, Ints
-from sim.linalg import Matrix, add, clear, factorise, matrix, number_free_dofs, solve
+from sim.linalg import Matrix, add, banded, clear, factorise, matrix, number_free_dofs, solve
 from sim.linalg.symmetric import seconds
 from tests.sim.structures import dense, mixed_polygons, rotating_squares
 
@@ -92,3 +92,9 @@ def test_fronts_are_chosen_where_they_are_faster() -> None:
         assert seconds(chosen) == min(map(seconds, options))
         kinds.append(chosen.by_fronts)
     assert kinds == [False, True]
+
+
+def test_a_long_strip_is_numbered_along_its_short_side() -> None:
+    pairs = [(k, k + 20) for k in range(60)] + [(k, k + 1) for k in range(80) if k % 20 < 19]
+    _, width = banded.number_free_dofs(80, np.array(pairs), np.array([], dtype=int))
+    assert width <= 3 * 6

@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -7,44 +5,13 @@ import scipy.sparse as sp
 from sim.core import SimulationError
 from sim.optimise import MmaOptions, Result, minimise
 from sim.optimise.mma_subproblem import Separable, UnsolvedError, minimise_separable
-from tests.sim.optimise.known_problems import (
-    Known,
-    cantilever,
-    corner,
-    many,
-    rosenbrock_in_disc,
-    shifted_bowl,
-)
+from tests.sim.optimise.known_problems import Known, cantilever, rosenbrock_in_disc
+from tests.sim.optimise.test_sqp import solved
 from tests.sim.structures import central
 
 
 def solve(known: Known, **changes: float) -> Result:
-    options = replace(MmaOptions(evaluations=100, residual=1e-5), **changes)  # type: ignore[arg-type]
-    return minimise("mma", known.loss, known.constraints, known.start, known.bounds, options)
-
-
-@pytest.mark.parametrize(
-    ("known", "tolerance"),
-    [(corner(), 1e-5), (shifted_bowl(), 1e-4), (cantilever(), 5e-3)],
-    ids=["corner", "bowl", "cantilever"],
-)
-def test_known_optima(known: Known, tolerance: float) -> None:
-    found = solve(known)
-    np.testing.assert_allclose(found.x, known.optimum, atol=tolerance)
-    assert found.violation == 0.0
-
-
-def test_hundreds_of_constraints() -> None:
-    known = many(40, 120)
-    found = solve(known)
-    np.testing.assert_allclose(found.x, known.optimum, atol=2e-2)
-    assert found.loss == pytest.approx(known.loss(known.optimum)[0], rel=1e-4)
-
-
-def test_every_simulated_design_is_feasible_and_the_accepted_ones_improve() -> None:
-    found = solve(corner())
-    assert all(e.violation == 0.0 for e in found.evaluations)
-    assert (np.diff([e.loss for e in found.evaluations if e.accepted]) < 0).all()
+    return solved(known, "mma", **changes)
 
 
 def test_steps_that_raise_the_loss_are_not_taken() -> None:

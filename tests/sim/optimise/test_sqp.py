@@ -23,23 +23,31 @@ from tests.sim.optimise.known_problems import (
 )
 
 EXACT = sim.SqpOptions(evaluations=150, retreats=0, residual=1e-6, progress=1e-9)
+OPTIONS: dict[Method, Any] = {
+    "sqp": EXACT,
+    "mma": sim.MmaOptions(evaluations=100, residual=1e-5),
+}
+KNOWN = {
+    "rosenbrock": (rosenbrock_in_disc(), {"sqp": 1e-5}),
+    "corner": (corner(), {"sqp": 1e-5, "mma": 1e-5}),
+    "bowl": (shifted_bowl(), {"sqp": 1e-6, "mma": 1e-4}),
+    "cantilever": (cantilever(), {"sqp": 1e-4, "mma": 5e-3}),
+}
+"""Problems, and how near each method comes to their optima."""
 
 
-def solve(known: Known, **changes: float) -> Result:
-    options = replace(EXACT, **changes)  # type: ignore[arg-type]
-    return minimise("sqp", known.loss, known.constraints, known.start, known.bounds, options)
+def solved(known: Known, method: Method = "sqp", **changes: float) -> Result:
+    options = replace(OPTIONS[method], **changes)
+    return minimise(method, known.loss, known.constraints, known.start, known.bounds, options)
 
 
-@pytest.mark.parametrize(
-    ("known", "tolerance"),
-    [(rosenbrock_in_disc(), 1e-5), (corner(), 1e-5), (shifted_bowl(), 1e-6), (cantilever(), 1e-4)],
-    ids=["rosenbrock", "corner", "bowl", "cantilever"],
-)
-def test_known_optima(known: Known, tolerance: float) -> None:
-    found = solve(known)
+@pytest.mark.parametrize(("name", "method"), [(n, m) for n, (_, by) in KNOWN.items() for m in by])
+def test_known_optima(name: str, method: Method) -> None:
+    known, tolerance = KNOWN[name][0], KNOWN[name][1][method]
+    found = solved(known, method)
     np.testing.assert_allclose(found.x, known.optimum, atol=tolerance)
-    assert found.stationarity.residual <= 1e-5
     assert found.violation == 0.0
+    assert method == "mma" or found.stationarity.residual <= 1e-5
 
 
 def test_unconstrained_rosenbrock() -> None:
@@ -48,26 +56,32 @@ def test_unconstrained_rosenbrock() -> None:
     assert len(found.evaluations) < 60
 
 
-def test_hundreds_of_constraints() -> None:
-    known = many()
-    found = solve(known)
+@pytest.mark.parametrize(
+    ("method", "size", "accuracy"), [("sqp", (100, 500), 1e-5), ("mma", (40, 120), 1e-4)]
+)
+def test_hundreds_of_constraints(method: Method, size: tuple[int, int], accuracy: float) -> None:
+    known = many(*size)
+    found = solved(known, method)
     np.testing.assert_allclose(found.x, known.optimum, atol=2e-2)
-    assert found.loss == pytest.approx(known.loss(known.optimum)[0], rel=1e-5)
-    assert len(found.evaluations) < 100
+    assert found.loss == pytest.approx(known.loss(known.optimum)[0], rel=accuracy)
+    assert len(found.evaluations) <= 100
 
 
-def test_every_simulated_design_is_feasible_and_seen_by_the_callback() -> None:
+@pytest.mark.parametrize("method", OPTIONS)
+def test_every_simulated_design_is_feasible_and_seen_and_the_accepted_improve(
+    method: Method,
+) -> None:
     known, seen = corner(), list[Evaluation]()
-    found = minimise(
-        "sqp", known.loss, known.constraints, known.start, options=EXACT, callback=seen.append
-    )
+    asked = (known.loss, known.constraints, known.start)
+    found = minimise(method, *asked, options=OPTIONS[method], callback=seen.append)
     assert tuple(seen) == found.evaluations
     assert all(evaluation.violation == 0.0 for evaluation in seen)
     assert [evaluation.number for evaluation in seen] == list(range(len(seen)))
+    assert (np.diff([each.loss for each in seen if each.accepted]) < 0).all()
 
 
 def test_losses_of_accepted_designs_decrease() -> None:
-    found = solve(rosenbrock_in_disc())
+    found = solved(rosenbrock_in_disc())
     accepted = [e.loss for e in found.evaluations if e.accepted]
     assert (np.diff(accepted) < 0).all()
     assert found.loss == min(accepted) == found.evaluations[found.best].loss
@@ -75,7 +89,7 @@ def test_losses_of_accepted_designs_decrease() -> None:
 
 def test_steps_respect_the_radius_and_the_bounds() -> None:
     radius = 0.1
-    found = solve(shifted_bowl(), radius=radius, radius_max=radius)
+    found = solved(shifted_bowl(), radius=radius, radius_max=radius)
     designs = np.array([e.x for e in found.evaluations])
     assert np.abs(np.diff(designs, axis=0)).max() <= radius + 1e-7
     assert np.abs(designs).max() <= 1.0
@@ -214,7 +228,7 @@ def test_the_best_design_is_that_whose_confirmed_loss_is_the_best(method: Method
 
 
 def test_runs_are_reproducible_bit_for_bit() -> None:
-    runs = [solve(many(40, 120), retreats=2, evaluations=60) for _ in range(2)]
+    runs = [solved(many(40, 120), retreats=2, evaluations=60) for _ in range(2)]
     assert runs[0].x.tobytes() == runs[1].x.tobytes()
     assert [e.loss for e in runs[0].evaluations] == [e.loss for e in runs[1].evaluations]
 

@@ -4,11 +4,21 @@ import pytest
 
 from sim.energy import Kinematics
 from sim.energy.ligament_kernels import gradient
-from sim.scene import DisplacementMimicking, StrainEnergyMimicking, strain_energies
+from sim.scene import (
+    DisplacementMimicking,
+    Evaluator,
+    StrainEnergyMimicking,
+    make_plan,
+    mimicking,
+    simulate,
+    strain_energies,
+)
 from sim.scene.objectives import RelativeMimicking, extent
 from sim.solvers import Harmonic
 from sim.time_integration import simpson_weights
-from tests.sim.structures import Rig, rotating_squares, some_ligaments
+from tests.sim.load_family.test_load_family import mimicked
+from tests.sim.scene.test_plan import design_of
+from tests.sim.structures import Rig, rotating_squares, some_ligaments, taylor_orders
 
 RIG = Rig(rotating_squares(), np.array([0, 4]), np.array([12]), Harmonic(1.0, 2.0))
 MOTION = np.random.default_rng(2).normal(size=(2, 5, 25, 3)) * [1.0, 1.0, 0.1]
@@ -58,3 +68,27 @@ def test_strain_energies_are_the_kernels() -> None:
         assert found[case, time, k] == pytest.approx(energy, rel=1e-12)
     losses = StrainEnergyMimicking(ligaments, units, WEIGHTS)(jnp.asarray(MOTION), values)
     np.testing.assert_allclose(losses, np.asarray(found).sum(axis=2) @ WEIGHTS, rtol=1e-13)
+
+
+def test_the_force_of_the_cut_ligaments_is_that_of_the_drive() -> None:
+    """And as a part of what is mimicked the loss is the sum of both errors."""
+    scene = mimicked().updated(reaction=0.5)
+    response = simulate(scene, design_of(scene, 0.2))
+    measure = mimicking(scene)
+    force = measure.force(response.displacement, response.parameters)  # type: ignore[union-attr]
+    np.testing.assert_allclose(force, response.drive_force, rtol=1e-9, atol=1e-9)
+    intact = simulate(scene.objective.reference).drive_force  # type: ignore[arg-type]
+    np.testing.assert_allclose(measure.target, intact, rtol=1e-9, atol=1e-9)  # type: ignore[union-attr]
+    design = design_of(scene, 0.2)
+    evaluate = Evaluator(scene, make_plan(scene))
+    value, gradient, _ = evaluate(design)
+    alone = Evaluator(scene.updated(reaction=0.0), make_plan(scene))(design)[0]
+    assert scene.objective.reference is not None
+    forces = [simulate(scene, design).drive_force, simulate(scene.objective.reference).drive_force]
+    missed, size = np.linalg.norm(forces[0] - forces[1]), np.linalg.norm(forces[1][0, -1])
+    assert value == pytest.approx(alone + 0.5 * missed / size, rel=1e-9)
+    way = gradient / np.linalg.norm(gradient)
+    ahead = taylor_orders(
+        lambda step: evaluate(design + step * way)[0], gradient @ way, np.array([2e-3, 1e-3])
+    )
+    np.testing.assert_allclose(ahead, 2.0, atol=0.07)

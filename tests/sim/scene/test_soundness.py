@@ -11,7 +11,7 @@ from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
 from sim.scene import SceneError, check_scene
 from sim.solvers import MotionLaw, solve_case
-from tests.sim.structures import LEFT, Rig, hand_made, pressed, rotating_squares
+from tests.sim.structures import LEFT, Rig, hand_made, pressed, rotating_squares, squeezed
 
 
 def scene(motion: MotionLaw | None = None, **changes: Any) -> sim.Scene:  # noqa: ANN401
@@ -92,7 +92,7 @@ def test_units_that_cross_themselves_are_refused() -> None:
     far = np.full(scene().space.n_variables, 20.0) * (-1.0) ** np.arange(scene().space.n_variables)
     with pytest.raises(SceneError, match="edges that cross"):
         sim.simulate(scene(), far)
-    rig = Rig(rotating_squares(), LEFT, LEFT + 4, sim.LinearRamp(-1.0, 1.0))
+    rig = squeezed(1.0)
     values = rig.values._replace(mass=-rig.values.mass)
     with pytest.raises(sim.SimulationError, match="less than none"):
         solve_case(StaticSolver(rig.topology, np.ones(1)), values, rig.drive)
@@ -141,7 +141,7 @@ def test_a_ligament_that_vanishes_on_the_way_is_an_error() -> None:
 @pytest.mark.parametrize("softer", [1e-3, 1e-9])
 def test_soft_structures_are_solved_as_well_as_stiff_ones(softer: float) -> None:
     """A floor in N would call any state of a soft one balanced."""
-    rig = Rig(rotating_squares(), LEFT, LEFT + 4, sim.LinearRamp(-3.0, 1.0))
+    rig = squeezed(3.0)
     soft = rig.values._replace(law=softer * rig.values.law, contact=softer * rig.values.contact)
     stiff, found = (
         solve_case(StaticSolver(rig.topology, np.array([0.5, 1.0])), values, rig.drive)[0]

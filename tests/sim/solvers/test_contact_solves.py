@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -11,32 +10,15 @@ from sim.collision import CandidatePairs
 from sim.core import Floats, SimulationError
 from sim.energy import observe
 from sim.quasistatics import StaticSolver
-from sim.solvers import Harmonic, LinearRamp, Solver, solve_case
+from sim.solvers import LinearRamp, Solver, solve_case
 from sim.structure import clearance, close_pairs, displaced
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 from tests.sim.solvers.test_gradients import Ray, assert_exact_in_contact
-from tests.sim.structures import Rig, hand_made, rotating_squares
+from tests.sim.structures import Rig, hand_made, rotating_squares, shaken, squeezed
 
 DISTANCE = 0.1875
-LEFT = 5 * np.arange(5)
 DURATION = 0.012
 ASKED = np.linspace(0.0, DURATION, 41)
-
-
-@cache
-def squeezed(side: int = 5, depth: float = 10.0, bias_deg: float = 20.0) -> Rig:
-    """Squares between plates, of which one moves in."""
-    left = side * np.arange(side)
-    squares = rotating_squares(side, bias_deg)
-    return Rig(squares, left, left + side - 1, LinearRamp(-depth, 1.0), DISTANCE)
-
-
-@cache
-def shaken() -> Rig:
-    """5 x 5 squares, nearly closed, the middle shaken."""
-    motion = Harmonic(2.0, 150.0, 0.6, rise=0.0015, delay=0.003)
-    squares = rotating_squares(5, 44.0)
-    return Rig(squares, np.array([0, 4, 20, 24]), np.array([12]), motion, DISTANCE)
 
 
 DYNAMIC: dict[str, Callable[[Rig], Solver]] = {
@@ -79,14 +61,14 @@ def overlaps(rig: Rig, states: Floats) -> int:
 
 def test_a_lattice_that_overlaps_with_contact_on_angles_does_not_on_distances() -> None:
     """The paper's lattice, its right column driven by 15 mm."""
-    rig, loads = squeezed(15, 15.0), np.linspace(0.1, 1.0, 10)
+    rig, loads = squeezed(15.0, 15, distance=DISTANCE), np.linspace(0.1, 1.0, 10)
     angles = replace(rig, distance=None)
     assert overlaps(angles, path(angles, StaticSolver(angles.topology, loads))) == 2
     assert_clear_in_contact(rig, path(rig, StaticSolver(rig.topology, loads)))
 
 
 def test_one_large_step_ends_where_small_ones_do() -> None:
-    rig = squeezed()
+    rig = squeezed(10.0, distance=DISTANCE)
     at_once, in_steps = (
         path(rig, StaticSolver(rig.topology, loads))[-1]
         for loads in (np.ones(1), np.linspace(0.05, 1.0, 20))
@@ -96,14 +78,14 @@ def test_one_large_step_ends_where_small_ones_do() -> None:
 
 def test_a_structure_that_starts_all_but_touching() -> None:
     """Squares turned until their corners all but meet, and pressed on with a large load."""
-    rig = squeezed(5, 4.0, 49.4)
+    rig = squeezed(4.0, bias_deg=49.4, distance=DISTANCE)
     start = clearance(rig.lattice, rig.lattice.vertices, np.zeros((1, 25, 3))).gap[0]
     assert start < DISTANCE
     assert_clear_in_contact(rig, path(rig, StaticSolver(rig.topology, np.ones(1))))
 
 
 def test_units_that_overlap_at_rest_are_named() -> None:
-    rig = squeezed(5, 1.0, 53.0)
+    rig = squeezed(1.0, bias_deg=53.0, distance=DISTANCE)
     with pytest.raises(SimulationError, match="overlap at rest"):
         path(rig, StaticSolver(rig.topology, np.ones(1)))
 
@@ -135,13 +117,13 @@ def test_what_is_driven_through_a_held_unit_is_an_error() -> None:
 
 @pytest.mark.parametrize("solver", DYNAMIC)
 def test_motions_stay_clear(solver: str) -> None:
-    rig = shaken()
+    rig = shaken(bias_deg=44.0, distance=DISTANCE)
     assert_clear_in_contact(rig, path(rig, DYNAMIC[solver](rig)))
 
 
 @pytest.mark.parametrize("quantity", ["design", "stiffness", "contact", "drive"])
 def test_gradients_of_equilibria(quantity: str) -> None:
-    ray = Ray(squeezed(), equilibria, quantity)
+    ray = Ray(squeezed(10.0, distance=DISTANCE), equilibria, quantity)
     assert_clear_in_contact(ray.rig, path(ray.rig, ray.solver))
     assert_exact_in_contact(ray)
 
@@ -149,5 +131,5 @@ def test_gradients_of_equilibria(quantity: str) -> None:
 @pytest.mark.parametrize("quantity", ["design", "contact"])
 @pytest.mark.parametrize("solver", DYNAMIC)
 def test_gradients_of_motions(solver: str, quantity: str) -> None:
-    rig = shaken()
-    assert_exact_in_contact(Ray(rig, DYNAMIC[solver], quantity))
+    ray = Ray(shaken(bias_deg=44.0, distance=DISTANCE), DYNAMIC[solver], quantity)
+    assert_exact_in_contact(ray)

@@ -28,9 +28,8 @@ from sim.solvers import (
 )
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 from sim.vibration import linearised
-from tests.sim.structures import Rig, rotating_squares
+from tests.sim.structures import CORNERS, MIDDLE, Rig, rotating_squares
 
-CORNERS, MIDDLE = np.array([0, 4, 20, 24]), np.array([12])
 SIDEWAYS = np.array([[DISPLACEMENT, FREE, DISPLACEMENT]])
 PUSHED = np.array([[FORCE, FREE, DISPLACEMENT]])
 LOADS = np.linspace(0.1, 1.0, 10)

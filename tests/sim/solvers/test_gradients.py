@@ -35,7 +35,16 @@ from sim.time_integration import (
 )
 from sim.time_integration.esdirk import march
 from sim.time_integration.esdirk_stage import solve_stage
-from tests.sim.structures import Numbers, Rig, mixed_polygons, rotating_squares, uneven_loss
+from tests.sim.structures import (
+    CORNERS,
+    Numbers,
+    Rig,
+    mixed_polygons,
+    rotating_squares,
+    shaken,
+    squeezed,
+    uneven_loss,
+)
 
 TAYLOR = {
     "design": np.geomspace(1e-3, 1e-4, 4),
@@ -76,19 +85,9 @@ QUANTITIES = ("design", "stiffness", "density", "damping", "drive")
 
 
 @cache
-def shaken(bias_deg: float = 20.0, recorded: bool = False, amplitude: float = 2.0) -> Rig:
-    """5 x 5 squares with clamped corners, the middle shaken for 1.8 periods of 150 Hz."""
-    motion = (
-        measured() if recorded else sim.Harmonic(amplitude, 150.0, 0.6, rise=0.0015, delay=0.003)
-    )
-    return Rig(rotating_squares(5, bias_deg), np.array([0, 4, 20, 24]), np.array([12]), motion)
-
-
-@cache
-def squeezed(depth: float, side: int = 5) -> Rig:
-    """Squares between plates, of which one moves in."""
-    left = side * np.arange(side)
-    return Rig(rotating_squares(side), left, left + side - 1, sim.LinearRamp(-depth, 1.0))
+def recorded() -> Rig:
+    """The middle of the shaken squares, along a recorded wave."""
+    return replace(shaken(), motion=measured())
 
 
 @cache
@@ -97,12 +96,10 @@ def pushed(slowly: bool) -> Rig:
     course = (
         sim.LinearRamp(0.4, 1.0, 2.0) if slowly else sim.Harmonic(0.4, 150.0, 2.0, 0.0015, 0.003)
     )
-    shares, control = (
-        np.array([[1.0], [-0.3]]),
-        np.array([[FORCE, FORCE, DISPLACEMENT], [FORCE] * 3]),
-    )
+    shares = np.array([[1.0], [-0.3]])
+    control = np.array([[FORCE, FORCE, DISPLACEMENT], [FORCE] * 3])
     forces, driven = Together((course,), shares), np.array([12, 18])
-    return Rig(rotating_squares(), np.array([0, 4, 20, 24]), driven, forces, control=control)
+    return Rig(rotating_squares(), CORNERS, driven, forces, control=control)
 
 
 @cache
@@ -214,7 +211,7 @@ SMOOTH: Rows = [
     (partial(pushed, slowly=True), ("static",), ("design", "stiffness", "drive")),
     (partial(pushed, slowly=False), LOOPS, QUANTITIES),
     (shaken, DYNAMIC, ("design", "damping", "drive")),
-    (partial(shaken, recorded=True), DYNAMIC, ("drive",)),
+    (recorded, DYNAMIC, ("drive",)),
     (pulled, LOOPS, ("design", "drive")),
 ]
 TOUCHING: Rows = [

@@ -8,18 +8,9 @@ from shapely import Polygon
 from shapely.affinity import rotate
 
 from sim.core import Floats
-from sim.structure import Lattice, shape, void_angles
+from sim.structure import Lattice, displaced, void_angles
 from sim.structure.geometry import inertia
 from tests.sim.structures import mixed_polygons, rotating_squares
-
-
-def displaced(lattice: Lattice, vertices: Floats, motion: Floats) -> Floats:
-    """Vertices after rigid motions (n_units, 3) of the units about their centroids."""
-    made = shape(lattice, vertices)
-    c, s = np.cos(motion[:, 2])[lattice.unit], np.sin(motion[:, 2])[lattice.unit]
-    arm = np.asarray(made.arm)
-    turned = np.stack([c * arm[:, 0] - s * arm[:, 1], s * arm[:, 0] + c * arm[:, 1]], axis=1)
-    return np.asarray(made.centroid)[lattice.unit] + motion[lattice.unit, :2] + turned
 
 
 def perturbed(lattice: Lattice, size: float = 0.8) -> Floats:

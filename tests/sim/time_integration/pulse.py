@@ -7,12 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.core import Floats, Numbers
-from sim.solvers import Harmonic
 from sim.time_integration import ExplicitSolver
 from tests.sim.structures import Rig, rotating_squares
 
 DURATION = 4e-3
-CORNERS, MIDDLE = np.array([0, 4, 20, 24]), np.array([12])
 
 
 class Pulse(NamedTuple):
@@ -32,12 +30,6 @@ class Pulse(NamedTuple):
 def pulsed() -> Rig:
     """3 x 3 squares, one clamped and one pushed smoothly; no contact."""
     return Rig(rotating_squares(3), np.array([0]), np.array([4]), Pulse(1.0, DURATION, 0.4))
-
-
-def shaken(amplitude: float, bias_deg: float = 20.0) -> Rig:
-    """5 x 5 squares, clamped at the corners and shaken at the centre; voids close."""
-    motion = Harmonic(amplitude, 150.0, 0.6, rise=0.0015, delay=0.003)
-    return Rig(rotating_squares(5, bias_deg), CORNERS, MIDDLE, motion)
 
 
 @cache

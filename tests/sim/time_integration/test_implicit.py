@@ -9,7 +9,7 @@ from sim.quasistatics import StaticSolver
 from sim.solvers import LinearRamp, TimeSeries, solve_case
 from sim.time_integration import ImplicitSolver
 from sim.time_integration.coefficients import ESDIRK3
-from tests.sim.structures import NONE, Rig, rotating_squares
+from tests.sim.structures import CORNERS, LEFT, MIDDLE, NONE, Rig, rotating_squares, shaken
 from tests.sim.time_integration import pulse
 
 
@@ -50,7 +50,7 @@ def solver_for(rig: Rig, n_steps: int = 60) -> ImplicitSolver:
 
 
 def test_every_stage_stays_inside_the_barrier() -> None:
-    rig = pulse.shaken(2.5, bias_deg=45.0)
+    rig = shaken(2.5, bias_deg=45.0)
     record = solver_for(rig).forward(rig.values, rig.drive)[2]
     stages = record.u[:-1].reshape(-1, rig.lattice.n_units, 3)
     angles = rig.topology.smallest_void_angles(rig.values.void, stages)
@@ -58,7 +58,7 @@ def test_every_stage_stays_inside_the_barrier() -> None:
 
 
 def test_a_grid_that_is_too_coarse_is_split_where_it_fails() -> None:
-    rig = pulse.shaken(3.0, bias_deg=40.0)
+    rig = shaken(3.0, bias_deg=40.0)
     coarse = solver_for(rig, n_steps=12)
     u, _, record = coarse.forward(rig.values, rig.drive)
     assert len(record.times) > len(coarse.times)
@@ -74,7 +74,7 @@ def test_a_grid_that_is_too_coarse_is_split_where_it_fails() -> None:
 
 
 def test_stiff_ligaments_shorten_all_steps_to_come() -> None:
-    rig = pulse.shaken(0.5)
+    rig = shaken(0.5)
     law = rig.values.law.copy()
     law[..., 0] *= 1e3
     stiff = rig.values._replace(law=law)
@@ -86,7 +86,7 @@ def test_stiff_ligaments_shorten_all_steps_to_come() -> None:
 
 
 def test_a_slow_drive_follows_the_equilibria() -> None:
-    rig = Rig(rotating_squares(), 5 * np.arange(5), 5 * np.arange(5) + 4, LinearRamp(-4.0, 10.0))
+    rig = Rig(rotating_squares(), LEFT, LEFT + 4, LinearRamp(-4.0, 10.0))
     times = np.linspace(0.0, 10.0, 41)
     dynamic = solve_case(
         ImplicitSolver(rig.topology, times, times[-1:], tolerance=1e-6), rig.values, rig.drive
@@ -110,7 +110,7 @@ def test_turning_around_several_times() -> None:
 
 
 def test_asked_times_do_not_change_the_steps() -> None:
-    rig = pulse.shaken(1.0)
+    rig = shaken(1.0)
     solver = solver_for(rig)
     between = replace(solver, output_times=solver.times[3::7])
     one, other = (s.forward(rig.values, rig.drive) for s in (solver, between))
@@ -124,13 +124,13 @@ def test_a_rough_recorded_drive_needs_few_cuts() -> None:
     knots = np.linspace(0.0, 0.012, 25)
     noise = np.random.default_rng(5).normal(size=(25, 3)) * [0.5, 0.5, 0.03]
     series = TimeSeries(knots, np.sin(np.pi * knots / 0.012)[:, None] * noise)
-    rig = Rig(rotating_squares(), pulse.CORNERS, pulse.MIDDLE, series)
+    rig = Rig(rotating_squares(), CORNERS, MIDDLE, series)
     record = solver_for(rig).forward(rig.values, rig.drive)[2]
     assert len(record.times) < 75
 
 
 def test_halving_for_the_error_estimate() -> None:
-    rig = pulse.shaken(1.0)
+    rig = shaken(1.0)
     solver = solver_for(rig)
     record = solver.forward(rig.values, rig.drive)[2]
     np.testing.assert_allclose(solver.refined(record).times, np.linspace(0.0, 0.012, 121))

@@ -1,4 +1,4 @@
-"""The steps that a plan chooses for the lattice of Figure 7, intact and with its void."""
+"""The lattice of Figure 7, scene A at the shortest steps, and a large lattice past its snap."""
 
 from dataclasses import replace
 
@@ -8,9 +8,13 @@ from pipeline import problem
 from pipeline.posing import scene_of
 from pipeline.runtime import ROOT
 from sim.core import Floats
+from sim.quasistatics import StaticSolver
 from sim.scene import Scene, concrete_parameters, make_plan, mimicking
-from sim.solvers import solve_case
+from sim.solvers import LinearRamp, solve_case
+from sim.structure import quads
 from sim.time_integration import ExplicitSolver
+from tests.sim.scene.test_reference import assert_agrees_with_scene_a, outcome_of_scene_a
+from tests.sim.structures import Rig
 
 PROBLEM = ROOT / "experiments/fig7/problem.yaml"
 
@@ -39,3 +43,25 @@ def test_they_agree_with_steps_of_a_sixth() -> None:
     for one, other in zip(coarse, fine, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-2 * np.abs(other).max())
     np.testing.assert_allclose(loss, exact, rtol=1e-3)
+
+
+def test_scene_a_at_tight_accuracy() -> None:
+    assert_agrees_with_scene_a(outcome_of_scene_a("tight"), motion=1e-4, loss=1e-6, gradient=5e-5)
+
+
+SIDE = 160
+
+
+def test_the_end_past_a_snap_does_not_depend_on_the_loads() -> None:
+    """Beyond its limit point this lattice creeps, and mirrored columns are critical at once."""
+    left = SIDE * np.arange(SIDE)
+    lattice = quads(SIDE, SIDE, 15.0, 2.3, np.deg2rad(20.0))
+    rig = Rig(lattice, left, left + SIDE - 1, LinearRamp(-0.1 * SIDE * 15.0, 1.0))
+    once, often = (
+        StaticSolver(rig.topology, np.arange(1, count + 1) / count).forward(rig.values, rig.drive)
+        for count in (1, 10)
+    )
+    np.testing.assert_allclose(once[2].snaps, often[2].snaps, rtol=0, atol=1e-6)
+    assert len(once[2].snaps) == 1
+    # what the residual's tolerance leaves open, over the smallest eigenvalue of 2e-4 N/mm
+    np.testing.assert_allclose(once[0][-1], often[0][-1], rtol=0, atol=2e-4)

@@ -1,13 +1,18 @@
-"""The baseline of the benchmarks, compiled as a whole, solves the same problem."""
+"""The baseline solves the same problem, and what is skipped by compiling once changes nothing."""
+
+from functools import partial
 
 import numpy as np
 import pytest
 
-from benchmarks.methods import jax_baseline
+from benchmarks.harness import errors, result_of
+from benchmarks.methods import jax_baseline, selection
 from benchmarks.scenes import paper_scenes
+from benchmarks.suites import SKIPS, Skip
 from sim.scene import Clamp, Evaluator, Scene, make_plan, mimicking, sample_times
 from sim.solvers import Harmonic, PrescribedMotion
 from sim.structure import quads
+from tests.benchmarks.test_suites import COMPILED, refuse_change
 
 
 def small() -> Scene:
@@ -35,3 +40,24 @@ def test_the_baseline_finds_the_same_loss() -> None:
     values, work = jax_baseline.prepare(of_case, len(start), "loss")()
     assert float(values["loss"]) == pytest.approx(loss, rel=1e-4)
     assert work["steps"] > 100
+
+
+def test_the_continuous_adjoint_of_diffrax_comes_to_that_of_its_steps() -> None:
+    every = {method.name: method for method in selection.methods("small_wave")}
+    discrete, continuous = (
+        every[name].prepare(1e-6, "gradient")().values
+        for name in ("diffrax Tsit5", "diffrax Tsit5, backsolve")
+    )
+    found = errors(continuous, discrete)
+    assert found["displacement"] == 0.0
+    assert 0 < found["gradient"] < 1e-3
+
+
+@pytest.mark.parametrize(
+    "skip", [skip for skip in SKIPS if skip.name in COMPILED], ids=lambda skip: skip.name
+)
+def test_a_skip_changes_nothing_beyond_its_tolerance(skip: Skip) -> None:
+    """Each in a process of its own, which has not loaded the loops before."""
+    prepare = partial(skip.prepare, "small_wave")
+    values = [result_of(prepare, made, "loss") for made in (0.0, 1.0)]
+    refuse_change(skip, *values)
