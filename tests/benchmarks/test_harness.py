@@ -49,7 +49,7 @@ def test_methods_run_in_turn(toy: tuple[list[Measurement], list[str]]) -> None:
     assert rounds == [f"round {turn}" for turn in turns]
 
 
-def test_measurements_hold_times_errors_work_and_memory(
+def test_measured_times_errors_work_and_memory(
     toy: tuple[list[Measurement], list[str]],
 ) -> None:
     one = Measurement("one", cpu_s=(4.0, 8.0, 6.0))
@@ -108,9 +108,7 @@ def test_targets_and_the_table_are_told(toy: tuple[list[Measurement], list[str]]
     assert lines[3].endswith("1001 evaluations")
 
 
-def test_measurements_are_stored_and_stand_in_for_a_baseline(
-    toy: tuple[list[Measurement], list[str]], tmp_path: Path
-) -> None:
+def test_stored_measurements(toy: tuple[list[Measurement], list[str]], tmp_path: Path) -> None:
     suite, fine = toy_benchmark.suite(), toy[0][1]
     path = storage.write(suite, toy[0], ABOUT, {"repeats": 3}, tmp_path)
     data = datasets.read(path, "benchmark")
@@ -177,9 +175,7 @@ def test_short_suites_are_chosen_and_every_one_can_be() -> None:
     ("arguments", "message"),
     [(["fig9"], "no such suite"), (["--core", "4096"], "no core 4096")],
 )
-def test_mistakes_end_in_words(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_mistakes(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(arguments) == 2
     told = capsys.readouterr().err
     assert told.startswith(f"error: {message}")

@@ -68,9 +68,7 @@ def test_it_says_that_nothing_was_filmed(page: Chrome) -> None:
 
 
 @pytest.mark.parametrize(("width", "ratio"), [(1280, 1.0), (390, 3.0)])
-def test_the_index_fits_and_leads_to_the_page(
-    browse: Open, results: Path, width: int, ratio: float
-) -> None:
+def test_the_index_leads_to_the_page(browse: Open, results: Path, width: int, ratio: float) -> None:
     browser = browse(results / "index.html", width, 844, ratio)
     assert browser.execute_script("return document.documentElement.scrollWidth") <= width
     image = browser.find_element(By.CSS_SELECTOR, "#figures img")

@@ -8,14 +8,14 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import psutil
 import yaml
 
+from pipeline.problem.reading import overlay_keys
 from pipeline.runtime import ROOT, RUN_MARK
 
 STUDY = "tiny"
@@ -31,7 +31,7 @@ response: { cycles: 1, samples: 21 }
 sweep: { grid: { drive.directions: { points: 3 }, drive.frequency: { points: 2 } } }
 report: { measured_constants: null, as_built: false }
 robustness: null
-presets: {}
+presets: null
 """)
 ROOMS = ("benchmarks", "experiments", "metacloak", "pipeline", "profiles", "reports", "sim")
 FILES = (
@@ -63,7 +63,7 @@ class Checkout:
         problem = yaml.safe_load((ROOT / "experiments/fig2/problem.yaml").read_text())
         target = root / f"experiments/{STUDY}/problem.yaml"
         target.parent.mkdir()
-        target.write_text(yaml.safe_dump(_laid_over(problem, SMALLER), sort_keys=False))
+        target.write_text(yaml.safe_dump(overlay_keys(problem, SMALLER), sort_keys=False))
         made = cls(root)
         made._git("init", "--quiet")
         made._git("add", "--all")
@@ -193,14 +193,6 @@ def _words(process: psutil.Process) -> list[str]:
         return process.cmdline()
     except psutil.Error:
         return []
-
-
-def _laid_over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    merged = dict(below)
-    for key, value in above.items():
-        nested = isinstance(value, dict) and value and isinstance(merged.get(key), dict)
-        merged[key] = _laid_over(merged[key], value) if nested else value
-    return merged
 
 
 def wait_until(

@@ -17,9 +17,7 @@ ALONE = [name for name, figure in paper_figures().items() if figure.studies == [
 
 
 @pytest.mark.parametrize("kind", REPORTS)
-def test_every_kind_has_its_function_and_options(
-    kind: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_kinds_have_functions_and_options(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     command = REPORTS[kind]
     parameters = inspect.signature(import_module(command.module).report).parameters
     assert list(parameters) == ["args"]

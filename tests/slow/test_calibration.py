@@ -175,9 +175,7 @@ def _bound(case: Case) -> Floats:
 
 
 @pytest.mark.parametrize("case", [forces_case, decay_case, squeezed_case, shaken_case])
-def test_intervals_hold_and_are_no_wider_than_need_be(
-    case: Callable[[Path], Case], tmp_path: Path
-) -> None:
+def test_intervals_hold_and_are_narrow(case: Callable[[Path], Case], tmp_path: Path) -> None:
     told = tried(case(tmp_path))
     for name, inside, width in zip(*told, strict=True):
         assert FEWEST <= inside <= MOST, name
@@ -218,9 +216,7 @@ TRACK = """
 """
 
 
-def test_ratios_of_stiffness_from_motion_alone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_stiffness_ratios_from_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.copy(SPECIMEN, tmp_path / "squeezed.yaml")
     track = yaml.safe_load(TRACK)
     start = TRUTH | {"bending_stiffness": "1.8 N mm/rad"}

@@ -170,9 +170,7 @@ def test_elastic_units_change_the_loss_by_a_per_cent_at_most(losses: tuple[float
     assert 0.004 < abs(elastic / rigid - 1) < 0.012
 
 
-def test_linear_motions_of_rigid_units_are_those_of_small_drives(
-    cloak: Cloak, losses: tuple[float, float]
-) -> None:
+def test_small_drives_move_rigid_units_linearly(cloak: Cloak, losses: tuple[float, float]) -> None:
     angles = [
         motion.direction for motion in cloak.scene.loads.motions if isinstance(motion, Harmonic)
     ]

@@ -63,7 +63,5 @@ def test_the_tutorials(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", OPTIMISING)
-def test_an_example_that_optimises_gives_its_numbers(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_optimising_examples_give_their_numbers(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     check_numbers(name, monkeypatch)

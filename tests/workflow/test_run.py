@@ -4,49 +4,32 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import psutil
 
-from pipeline.runtime import RUN_MARK
+from tests.e2e.checkout import Checkout, wait_until
 from tests.workflow.conftest import Sandbox
-
-
-def wait_for(condition: Callable[[], bool], seconds: float = 30.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.05)
-
-
-def jobs(root: Path) -> list[psutil.Process]:
-    """The running jobs of the workflow in a folder."""
-    found = []
-    for process in psutil.process_iter():
-        try:
-            if process.environ().get(RUN_MARK, "").startswith(f"{root}:"):
-                found.append(process)
-        except psutil.Error:
-            continue
-    return found
-
 
 DESIGN, OTHER = "results/fig2/design.nc", "results/fig4/design.nc"
 
 
-def start(sandbox: Sandbox, target: str, more: int = 0) -> subprocess.Popen[bytes]:
+def jobs(root: Path) -> list[psutil.Process]:
+    return Checkout(root).jobs()
+
+
+def start(sandbox: Sandbox, target: str, more: int = 0) -> subprocess.Popen[str]:
     """Starts the design of a study and waits until its first jobs, and `more`, are at work."""
     run = subprocess.Popen(
         [sys.executable, "-m", "pipeline", "run", target],
         cwd=sandbox.root,
         env=sandbox.environment(),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         start_new_session=True,
     )
-    wait_for(lambda: len(jobs(sandbox.root)) >= 2 + more)
+    wait_until(lambda: len(jobs(sandbox.root)) >= 2 + more, run, pause=0.05)
     return run
 
 

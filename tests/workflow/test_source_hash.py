@@ -26,9 +26,7 @@ def closure(module: str, root: Path) -> set[str]:
 
 
 @cases("workflow", "module, files")
-def test_a_closure_holds_what_is_imported_in_any_form_and_resources(
-    tree: Path, module: str, files: list[str]
-) -> None:
+def test_a_closure_holds_imports_and_resources(tree: Path, module: str, files: list[str]) -> None:
     assert closure(module, tree) == set(files)
 
 
@@ -66,9 +64,7 @@ def test_imports_are_followed_once_for_a_tree(tree: Path, monkeypatch: pytest.Mo
         assert source_hash("pipeline.stage", tree) == before
 
 
-def test_hash_ignores_dates_and_places(
-    tree: Path, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_hash_ignores_date_and_place(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     elsewhere = tmp_path_factory.mktemp("elsewhere") / "copy"
     tree.rename(elsewhere)
     for name in FILES:

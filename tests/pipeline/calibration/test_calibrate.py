@@ -109,9 +109,7 @@ def test_little_noise_makes_errors_below_one_percent(tmp_path: Path) -> None:
         assert constants.value(name) == pytest.approx(TRUE[name], rel=0.01)
 
 
-def test_what_the_data_do_not_tell_is_said(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_data_do_not_tell_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = synthesised(tmp_path, described([decay_set()], ["damping_ratio", "shear_stiffness"]))
     assert run_stage("calibrate", [str(path), "--out", str(tmp_path / "found.nc")]) == 0
     assert "shear_stiffness is not determined by these data" in capsys.readouterr().err

@@ -67,9 +67,7 @@ def measured_decay(lines: list[str], folder: Path) -> Path:
     ("change", "told"),
     [({}, "no decaying oscillation is seen"), ({20: 0.005}, "the clock does not ascend")],
 )
-def test_faulty_traces(
-    change: dict[int, float], told: str, tmp_path: Path, failing: Failing
-) -> None:
+def test_bad_traces(change: dict[int, float], told: str, tmp_path: Path, failing: Failing) -> None:
     clock = {k: k / 100 for k in range(64)} | change
     path = measured_decay([f"{clock[k]},{k}" for k in range(64)], tmp_path)
     said = failing("calibrate", [str(path), "--out", str(tmp_path / "found.nc")])

@@ -73,9 +73,7 @@ def test_a_toe_that_a_branch_does_not_show_is_refused(toe: str, told: str) -> No
 
 
 @pytest.mark.parametrize(("reversed_", "signs"), [("both", (-1, -1)), ("force", (1, -1))])
-def test_what_a_machine_counts_the_other_way_is_turned(
-    reversed_: str, signs: tuple[int, int]
-) -> None:
+def test_what_a_machine_counts_backwards_is_turned(reversed_: str, signs: tuple[int, int]) -> None:
     way, force = cycles()
     wanted = load_cycles.prepare_record(way, force, RecordOptions())
     options = RecordOptions.model_validate({"reversed": reversed_})
@@ -174,9 +172,7 @@ def test_equilibria_along_the_arc(morpher: LoadCycles, number: int, jumps: tuple
     np.testing.assert_allclose(force[:4], slope[:4], atol=0.003 * np.abs(known[:, 1]).max())
 
 
-def test_the_first_jumps_leave_a_path_that_turns_back(
-    morpher: LoadCycles, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_jumps_leave_a_turning_path(morpher: LoadCycles, monkeypatch: pytest.MonkeyPatch) -> None:
     """It turns where the first and the last jumps begin; stable parts are as solved.
 
     Where a ligament has turned by half a turn, the path ends.

@@ -55,9 +55,7 @@ def curves(*factors: float) -> list[SampleCurve]:
     return [*own, SampleCurve("compression_s1_s2", "compression", SAMPLES, way, mean)]
 
 
-def test_curves_are_those_of_the_simulator(
-    asked: Population, centre: Constants, emulator: CurveEmulator
-) -> None:
+def test_emulated_curves(asked: Population, centre: Constants, emulator: CurveEmulator) -> None:
     assert emulator.error < 5e-4
     at = np.array([0.4, 1.7, 3.6])
     logs = centre.logs(ELASTIC_NAMES) + np.array([0.6, -0.2, 0.3])

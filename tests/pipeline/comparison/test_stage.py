@@ -130,9 +130,7 @@ def test_the_same_files_give_the_same_bytes(
     assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
 
 
-def test_a_turned_camera_is_told_and_taken_out_and_a_scale_is_left_in(
-    study: list[str], film: xr.Dataset
-) -> None:
+def test_a_turn_of_the_camera_is_taken_out_a_scale_not(study: list[str], film: xr.Dataset) -> None:
     turn, scale = 0.01, 1.002
     cos, sin = np.cos(turn), np.sin(turn)
     matrix = np.array([[cos, sin], [-sin, cos]])  # of rows

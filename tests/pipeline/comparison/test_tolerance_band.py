@@ -62,9 +62,7 @@ def test_without_tolerances_every_specimen_is_the_design(study: tuple[Problem, P
     assert made.failures == ()
 
 
-def test_specimens_that_cannot_be_made_are_counted(
-    study: tuple[Problem, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_failures_are_counted(study: tuple[Problem, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sim.structure.perturbation.MOST_ROUNDS", 1)
     made = draws(study, samples=3, geometry=0.5)
     assert len(made.failures) == 3
@@ -90,8 +88,6 @@ def test_limits_hold_the_next_draw() -> None:
 
 
 @cases("comparison", "more, expected")
-def test_sizes_are_those_given_or_tried_or_usual(
-    tmp_path: Path, more: str, expected: dict[str, float]
-) -> None:
+def test_sizes_given_tried_or_usual(tmp_path: Path, more: str, expected: dict[str, float]) -> None:
     asked = problem.load(static.write(tmp_path, static.HOLE + more, size=5))
     assert asked.tolerances.model_dump(include=set(expected)) == expected

@@ -83,9 +83,7 @@ STABILITY = ["snap", "eigenvalue", "loss_other_branch", "snaps_by_contact"]
 
 
 @pytest.mark.parametrize(("version", "added"), [(2, [*STABILITY, *TRACED]), (3, TRACED)])
-def test_a_response_of_an_older_version_is_read(
-    version: int, added: list[str], tmp_path: Path
-) -> None:
+def test_an_older_response_is_read(version: int, added: list[str], tmp_path: Path) -> None:
     """It said less of stability; what it did not say reads NaN."""
     path = written("response", tmp_path)
     with xr.open_dataset(path) as opened:

@@ -119,9 +119,7 @@ SPOILT: list[tuple[Spoil, str, str]] = [
 
 
 @pytest.mark.parametrize(("spoil", "name", "what"), SPOILT, ids=[what for *_, what in SPOILT])
-def test_what_the_table_does_not_say_is_neither_written_nor_read(
-    spoil: Spoil, name: str, what: str, tmp_path: Path
-) -> None:
+def test_spoilt_data_are_refused(spoil: Spoil, name: str, what: str, tmp_path: Path) -> None:
     path = tmp_path / "response.nc"
     with pytest.raises(SchemaError) as caught:
         write(spoil(sample("response")), path, "response", ORIGIN)

@@ -35,9 +35,7 @@ def test_a_method_stores_its_own_part(fig2: Path) -> None:
     assert list(from_canonical(told["problem"]).optimiser.methods.chosen) == ["mma"]
 
 
-def test_the_commit_is_unknown_outside_a_checkout(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_commit_outside_a_checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(provenance, "ROOT", tmp_path)
     provenance.git_commit.cache_clear()
     assert provenance.git_commit() == "unknown"

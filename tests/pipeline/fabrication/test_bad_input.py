@@ -67,9 +67,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize("name", MISTAKES)
-def test_a_mistake_makes_one_message_and_no_package(
-    folder: Path, capsys: pytest.CaptureFixture[str], name: str
-) -> None:
+def test_a_mistake_is_told(folder: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     edit, expected = MISTAKES[name]
     edit(folder)
     out = folder / "fabrication/cloaked"

@@ -186,9 +186,7 @@ def plate_faults(path: Path) -> list[str]:
         ((226.0, 20.0), "part B1: it does not stand on the bed"),
     ],
 )
-def test_a_misplaced_part_is_caught(
-    tmp_path: Path, place: tuple[float, float], expected: str
-) -> None:
+def test_a_misplaced_part_fails(tmp_path: Path, place: tuple[float, float], expected: str) -> None:
     bodies, places = plate()
     found = plate_faults(write_3mf(tmp_path / "plate.3mf", bodies, places | {"B1": place}))
     assert any(words.startswith(expected) for words in found), found

@@ -185,9 +185,7 @@ def test_a_package_passes_as_it_is_written(whole: tuple[Path, Problem]) -> None:
 
 
 @pytest.mark.parametrize("name", DAMAGES)
-def test_a_damaged_package_is_refused(
-    package: Path, whole: tuple[Path, Problem], name: str
-) -> None:
+def test_a_damaged_package_fails(package: Path, whole: tuple[Path, Problem], name: str) -> None:
     damage, expected = DAMAGES[name]
     damage(package)
     assert expected in refused(package, whole[1])
@@ -203,9 +201,7 @@ def test_a_package_of_other_tabs_or_pins_is_refused(whole: tuple[Path, Problem],
     assert expected in str(raised.value)
 
 
-def test_shims_that_do_not_reach_from_slot_end_to_slot_end_are_found(
-    package: Path, whole: tuple[Path, Problem]
-) -> None:
+def test_shims_of_other_lengths_are_found(package: Path, whole: tuple[Path, Problem]) -> None:
     edited("bom.csv", "8.2500,8.1000", "8.3000,8.1000")(package)
     parts, settings = expected_parts(built.design(), "cloaked"), whole[1].fabrication
     shapes = unit_sections(read_stl(package / "print/assembled.stl"), parts, settings)
@@ -215,9 +211,7 @@ def test_shims_that_do_not_reach_from_slot_end_to_slot_end_are_found(
 
 
 @pytest.mark.parametrize("name", ["bom.csv", "laser/comb_sheet1_nominal.svg"])
-def test_a_file_that_was_changed_afterwards_is_found(
-    package: Path, whole: tuple[Path, Problem], name: str
-) -> None:
+def test_changed_files_are_found(package: Path, whole: tuple[Path, Problem], name: str) -> None:
     (package / name).write_bytes((package / name).read_bytes() + b"\n")
     with pytest.raises(UserError, match="is another file than listed"):
         check(package, whole[1])

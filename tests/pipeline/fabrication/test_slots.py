@@ -86,9 +86,7 @@ def test_slot_in_a_sharp_corner_goes_deeper_for_its_walls() -> None:
 @settings(max_examples=60, deadline=None)
 @given(quads(), st.sampled_from(["centroid", "ligament", "bisector"]))
 @example(Polygon(NARROW), "bisector")
-def test_slots_leave_walls_keep_apart_and_open_at_their_vertices(
-    polygon: Polygon, direction: str
-) -> None:
+def test_slots_leave_walls_keep_apart_and_are_open(polygon: Polygon, direction: str) -> None:
     wanted = asked(direction=direction)
     room = polygon
     try:

@@ -56,9 +56,7 @@ def test_the_drives_own_cases_come_first(robust: Path) -> None:
     assert scene.objective.copy_sharpness == 4.0
 
 
-def test_a_robust_design_tells_the_losses_of_the_drives_own_cases(
-    robust: Path, tmp_path: Path
-) -> None:
+def test_a_robust_design_tells_losses_of_the_drives_own_cases(robust: Path, tmp_path: Path) -> None:
     out = tmp_path / "design_sqp.nc"
     content = yaml.safe_load(robust.read_text())
     overlay = overlay_keys(content.pop("presets")["quick"], SMALLER)
@@ -115,9 +113,7 @@ def test_a_pulse_is_a_load_of_its_own(fig2: Path) -> None:
 
 
 @pytest.mark.parametrize("void", [None, {"disc": {"centre": ["30 mm", "58 mm"], "radius": "8 mm"}}])
-def test_a_preset_starts_from_the_design_of_the_study(
-    fig2: Path, tmp_path: Path, void: dict[str, object] | None
-) -> None:
+def test_starts_from_the_study(fig2: Path, tmp_path: Path, void: dict[str, object] | None) -> None:
     content = yaml.safe_load(fig2.read_text())
     presets, again = content["presets"], {"optimiser": {"start": "study"}}
     presets["quick"] = overlay_keys(presets["quick"], SMALLER)
@@ -137,9 +133,7 @@ def test_a_preset_starts_from_the_design_of_the_study(
 
 
 @pytest.mark.parametrize("given", [True, False])
-def test_a_start_is_given_where_one_is_asked_for(
-    fig2: Path, tmp_path: Path, failing: Failing, given: bool
-) -> None:
+def test_a_start_if_asked_for(fig2: Path, tmp_path: Path, failing: Failing, given: bool) -> None:
     words = ["--problem", str(fig2), "--method", "sqp", "--out", str(tmp_path / "x.nc")]
     more = ["--start", str(tmp_path / "design.nc")] if given else ["--preset", "worst"]
     assert "optimiser.start" in failing("design", [*words, *more])

@@ -78,9 +78,7 @@ def test_text_and_open_strokes_are_to_be_converted(drawn: str, what: str, tmp_pa
 
 
 @cases("problem", "name, size, x0")
-def test_images_of_the_studies(
-    placed: Placed, tmp_path: Path, name: str, size: int, x0: float
-) -> None:
+def test_images_of_studies(placed: Placed, tmp_path: Path, name: str, size: int, x0: float) -> None:
     asked = f"size: [{size} mm, {size} mm], centre: [{x0} mm, 221.25 mm]"
     low, high = box(placed(f"image: {{ file: {SHAPES / name}, {asked} }}, loose: remove"))
     np.testing.assert_allclose((low + high) / 2, [x0, 221.25])

@@ -126,9 +126,7 @@ def test_copies_of_copies_are_not_drawn(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["concat:a|b", "http:..example.org.a.mp4"])
-def test_the_name_of_a_video_is_no_address(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_video_is_no_address(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path(name).write_bytes(b"no video")
     with pytest.raises(UserError, match="not a readable video"):

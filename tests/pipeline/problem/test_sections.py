@@ -48,9 +48,7 @@ def test_a_default_is_a_value_that_may_be_given() -> None:
         (LoadRanges, {"frequency": [2.0, 1.0]}, "runs backwards"),
     ],
 )
-def test_what_does_not_go_together_is_refused(
-    section: type[Section], values: dict[str, object], told: str
-) -> None:
+def test_contradictory_keys(section: type[Section], values: dict[str, object], told: str) -> None:
     with pytest.raises(ValidationError, match=told):
         made(section, **values)
 

@@ -23,9 +23,7 @@ from tests.tables import cases, refused
     ],
     ids=["smile", "heart", "rigid heart", "shield"],
 )
-def test_counts_are_the_authors(
-    tmp_path: Path, more: str, size: int, counts: tuple[int, ...]
-) -> None:
+def test_counts_are_authors(tmp_path: Path, more: str, size: int, counts: tuple[int, ...]) -> None:
     """Units of the void, the cloak and of interest; variables of the design; ligaments."""
     problem = load(write(tmp_path, more, size))
     scene = scene_of(problem, tmp_path)

@@ -71,9 +71,7 @@ def test_a_damaged_line_is_computed_again_and_no_other(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("setting", ["1 Hz", "10 Hz"])
-def test_what_a_kill_left_of_a_line_is_cut_off_and_nothing_else(
-    tmp_path: Path, setting: str
-) -> None:
+def test_what_a_kill_left_of_a_line_is_cut_off_alone(tmp_path: Path, setting: str) -> None:
     path = tmp_path / "part_0.csv"
     with CaseLog(path, ["drive.frequency"]) as book:
         book.add([(0, [setting], FOUND[0])])

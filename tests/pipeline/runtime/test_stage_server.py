@@ -87,7 +87,7 @@ def sleeping(folder: Path) -> psutil.Process:
 
 
 @pytest.mark.usefixtures("server")
-def test_a_stage_has_the_streams_folder_environment_and_arguments_of_its_client(
+def test_a_stage_has_streams_folder_environment_and_arguments_of_its_client(
     folder: Path,
 ) -> None:
     each = [client(folder, *words) for words in (["3", "a b"], ["0"], ["segfault"])]

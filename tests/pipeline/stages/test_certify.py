@@ -36,9 +36,7 @@ def write(fig2: Path, folder: Path, **changes: object) -> Path:
     return path
 
 
-def test_a_design_is_made_and_certified(
-    fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_design_is_certified(fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(certify, "LOADS", 12)
     monkeypatch.setattr(certify, "SEARCHES", 4)  # one alone may end in a lesser maximum
     path, out = write(fig2, tmp_path), tmp_path / "certificate.nc"
@@ -69,9 +67,7 @@ def test_only_loads_in_ranges_are_certified(fig2: Path, tmp_path: Path, failing:
 
 
 @cases("stages", "changes, key")
-def test_ranges_without_a_meaning_are_refused(
-    fig2: Path, tmp_path: Path, changes: dict[str, object], key: str
-) -> None:
+def test_bad_ranges(fig2: Path, tmp_path: Path, changes: dict[str, object], key: str) -> None:
     with refused("", key):
         load(write(fig2, tmp_path, **changes))
 

@@ -37,9 +37,7 @@ def test_a_design_by_the_angle_law_is_where_it_starts(hole: list[str], tmp_path:
     assert not initial["design_vector"].values[0, 0].any()
 
 
-def test_the_best_of_several_descents_is_shipped(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_best_of_descents_is_shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     optimise, budgets = design.optimise, {4: 2, 5: 6, 6: 4}
 
     def limited(asked: Problem, *more: Any) -> Result:  # noqa: ANN401

@@ -60,9 +60,7 @@ def test_every_structure_about_every_equilibrium(analysed: Path) -> None:
     assert found["lateral_strain"].values == pytest.approx([0.0, -0.02], abs=1e-4)
 
 
-def test_what_cannot_be_analysed_is_one_message(
-    design: Path, tmp_path: Path, failing: Failing
-) -> None:
+def test_what_cannot_be_analysed_is_told(design: Path, tmp_path: Path, failing: Failing) -> None:
     wrong = {
         "spectrum": ["--problem", str(write(tmp_path, HOLE, size=5, amplitude=3.0)), "--quiet"],
         "spectrum.modes": options(tmp_path / "many", modes=500),

@@ -97,9 +97,7 @@ def test_polygons_with_other_numbers_of_corners(files: Path) -> None:
     ("codec", "layout", "suffix"),
     [("ffv1", "gray16le", ".mkv"), ("mjpeg", "yuvj444p", ".avi"), ("libx265", "yuv420p", ".mp4")],
 )
-def test_files_in_colour_of_16_bit_and_of_a_varying_rate(
-    tmp_path: Path, codec: str, layout: str, suffix: str
-) -> None:
+def test_files_of_other_layouts(tmp_path: Path, codec: str, layout: str, suffix: str) -> None:
     film = filmed("dots")
     stamps = [0, 30, 90, 120]
     video = tmp_path / f"clip{suffix}"

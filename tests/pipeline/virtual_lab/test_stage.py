@@ -57,9 +57,7 @@ def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> No
         assert float(video.streams.video[0].average_rate or 0) == 20.0
 
 
-def test_a_video_is_not_described_over_the_file_that_asked_for_it(
-    files: Path, tmp_path: Path, failing: Failing
-) -> None:
+def test_a_request_is_not_written_over(files: Path, tmp_path: Path, failing: Failing) -> None:
     asked = recording(tmp_path)
     before = asked.read_bytes()
     told = failing("film", words(files, asked, asked.with_suffix(".mp4")))
@@ -114,9 +112,7 @@ def test_a_plan_without_sense_is_refused(files: Path, tmp_path: Path, failing: F
 
 
 @pytest.mark.parametrize("codec", ["h264", "ffv1"])
-def test_a_rendered_video_that_was_damaged_is_not_tracked(
-    files: Path, tmp_path: Path, codec: str, failing: Failing
-) -> None:
+def test_a_damaged_video(files: Path, tmp_path: Path, codec: str, failing: Failing) -> None:
     """One bit, in whatever format; a frame that decodes to other numbers would tell nothing."""
     out = tmp_path / "run.mp4"
     assert render(files, recording(tmp_path, end="0.1 s", codec={"name": codec}), out) == 0

@@ -53,8 +53,6 @@ def test_speckle_is_thrown_on_all_faces(design: Path, tmp_path: Path) -> None:
     assert page.count(" c ") + page.count(" c\n") > 16 * 10 * 4
 
 
-def test_dots_that_cannot_be_printed_are_refused(
-    design: Path, tmp_path: Path, failing: Failing
-) -> None:
+def test_dots_beyond_print_are_refused(design: Path, tmp_path: Path, failing: Failing) -> None:
     words = ["--design", str(design), "--out", str(tmp_path / "marks.pdf"), "--diameter", "40"]
     assert "cannot be printed" in failing("markers", words)

@@ -33,9 +33,7 @@ def test_an_image_becomes_the_void(tmp_path: Path, name: str) -> None:
     assert len(void_units(load(tmp_path / "cat/problem.yaml"))) > 30
 
 
-def test_a_coloured_logo_becomes_the_void(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_coloured_logo_becomes_a_void(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Neither dark nor light on nothing; then light on dark."""
     logo, shape = Image.new("RGBA", (200, 200)), (20, 20, 180, 180)
     ImageDraw.Draw(logo).ellipse(shape, fill=(200, 160, 40, 255))

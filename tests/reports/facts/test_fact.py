@@ -25,9 +25,7 @@ def found(study: StudyResults) -> dict[str, Fact]:
     return {fact.key: fact for fact in shielding_facts(study)}
 
 
-def test_every_number_that_the_paper_quotes_is_there_once_and_in_a_group(
-    study: StudyResults, found: dict[str, Fact]
-) -> None:
+def test_quoted_numbers_are_there_once(study: StudyResults, found: dict[str, Fact]) -> None:
     everything = shielding_facts(study)
     assert len(everything) == len(found)
     assert all(fact.group for fact in everything)
@@ -44,9 +42,7 @@ def test_values(found: dict[str, Fact], key: str, value: float, words: str) -> N
     assert found[key].ours == words
 
 
-def test_losses_are_weighted_means_of_both_forms(
-    study: StudyResults, found: dict[str, Fact]
-) -> None:
+def test_both_losses_are_weighted_means(study: StudyResults, found: dict[str, Fact]) -> None:
     loss = study.response["loss"].mean("case")
     assert found["loss_start"].value == pytest.approx(float(loss[0]))
     assert found["loss_end"].value == pytest.approx(float(loss[1]))
@@ -54,9 +50,7 @@ def test_losses_are_weighted_means_of_both_forms(
     assert ratio == pytest.approx(shaken_study.SAMPLES)
 
 
-def test_peak_to_peak_is_that_of_the_middle_unit_at_45_degrees(
-    study: StudyResults, found: dict[str, Fact]
-) -> None:
+def test_peak_to_peak_of_the_middle_unit(study: StudyResults, found: dict[str, Fact]) -> None:
     unit, case = 7 + 15 * 14, 1
     uy = study.response["displacement"].values[:, case, :, unit, 1]
     np.testing.assert_array_equal(monitored(study.scene, study.response), uy)

@@ -70,9 +70,7 @@ def test_each_load_case_has_snapshots_and_a_curve_of_its_own(two: StudyResults) 
 
 
 @cases("reports", "degrees, labels")
-def test_a_drive_of_the_right_column_is_named(
-    degrees: tuple[float, ...], labels: list[str]
-) -> None:
+def test_a_drive_of_the_right_edge_is_named(degrees: tuple[float, ...], labels: list[str]) -> None:
     """The kind of strain, by the direction of the drive and its side."""
     asked = problem.load(FIG4)
     drive = asked.drive.model_copy(update={"directions": tuple(np.radians(degrees))})

@@ -51,9 +51,7 @@ def changed(study: StudyResults, name: Output, made: xr.Dataset) -> StudyResults
     return dataclasses.replace(study, datasets={**study.datasets, name: made})
 
 
-def test_the_problem_decides_on_the_report(
-    study: StudyResults, shield: StudyResults, smile: StudyResults
-) -> None:
+def test_kinds_of_reports(study: StudyResults, shield: StudyResults, smile: StudyResults) -> None:
     assert kinds.kind_of(study.problem).facts is shielding.shielding_facts
     without = study.problem.model_copy(update={"sweep": None})
     for problem in (without, shield.problem, smile.problem):
@@ -83,7 +81,7 @@ def test_mimicking_error_by_hand(smile: StudyResults) -> None:
     assert measures.measure_of(smile.problem).of(smile.response).sel(structure="intact").max() == 0
 
 
-def test_contraction_of_the_middle_seven_columns_and_force_on_all_driven_units(
+def test_contraction_of_seven_middle_columns_and_force_on_driven_units(
     smile: StudyResults,
 ) -> None:
     waist = np.mean([np.sin(np.pi * i / 14) for i in range(4, 11)])
@@ -156,9 +154,7 @@ def test_the_headline_is_told_as_built_too(shield: StudyResults) -> None:
     assert table.rows[1][1][0] == (fact.ours, fact_records.ABSENT)
 
 
-def test_a_paper_is_quoted_by_the_keys_of_the_facts(
-    shield: StudyResults, smile: StudyResults
-) -> None:
+def test_a_paper_is_quoted_by_the_keys_of_facts(shield: StudyResults, smile: StudyResults) -> None:
     assert values(shield)["rotation_reduction"].paper == "64 %"
     assert values(shield)["rotation_altered"].paper == fact_records.ABSENT
     assert {fact.paper for fact in values(smile).values()} == {fact_records.ABSENT}
@@ -331,9 +327,7 @@ def test_amplitudes_of_rotations_are_told_in_degrees(smile: StudyResults) -> Non
 
 
 @pytest.mark.parametrize("law", ["angle", "geometric"])
-def test_evaluations_by_the_angle_law_are_told_where_they_come_first(
-    smile: StudyResults, law: Literal["angle", "geometric"]
-) -> None:
+def test_evaluations_by_angle(smile: StudyResults, law: Literal["angle", "geometric"]) -> None:
     asked = smile.problem.with_optimiser(angle=smile.problem.optimiser.methods.sqp)
     found = checks.history_facts(law_comparison.under(asked, law), smile.design)
     assert ("evaluations_angle" in {fact.key for fact in found}) == (law == "geometric")

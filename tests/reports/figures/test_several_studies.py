@@ -32,9 +32,7 @@ def report(pair: list[StudyResults], tmp_path_factory: pytest.TempPathFactory) -
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4])
-def test_the_figure_is_legible_with_any_number_of_studies(
-    pair: list[StudyResults], count: int
-) -> None:
+def test_it_is_legible_with_any_number_of_studies(pair: list[StudyResults], count: int) -> None:
     with style.styled():
         made = figure_assertions.drawn(figure.several_studies_figure((pair * 2)[:count]).draw())
     figure_assertions.assert_legible(made)

@@ -12,9 +12,7 @@ from reports.study import StudyResults, from_dataset
 CUTOFF = np.deg2rad(-10.0)
 
 
-def test_a_wave_that_is_mimicked_gets_a_report_of_its_own(
-    shield: StudyResults, smile: StudyResults
-) -> None:
+def test_a_mimicked_wave_has_its_own_report(shield: StudyResults, smile: StudyResults) -> None:
     wave = problem.load(ROOT / "experiments/fig7/problem.yaml")
     assert kinds.kind_of(wave).facts is facts.wave_facts
     assert kinds.kind_of(shield.problem).facts is not facts.wave_facts

@@ -93,9 +93,7 @@ def test_page_tells_where_it_is_from(html: str, study: StudyResults) -> None:
     assert "&#34;spacing&#34;: 15.0" in html
 
 
-def test_page_shows_paper_and_ours_but_where_there_is_no_paper(
-    html: str, quick: StudyResults, quick_report: Path
-) -> None:
+def test_page_shows_paper_and_ours(html: str, quick: StudyResults, quick_report: Path) -> None:
     for words in ("≈ 70 %", "88.0 %", "5.2 mm", "63 %", "&lt; 0.35"):
         assert words in html
     assert '<th scope="col">Paper</th>' in html

@@ -24,9 +24,7 @@ def doubted(path: Path) -> list[str]:
     return list(doubts(asked := load(path), scene_of(asked, path.parent)))
 
 
-def test_a_picture_and_a_line_of_its_cost(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_picture_and_a_line_of_cost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
     assert main(["check", "--problem", str(path), "--out-dir", str(tmp_path / "out")]) == 0
     told = capsys.readouterr().err

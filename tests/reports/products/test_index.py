@@ -73,9 +73,7 @@ def test_an_empty_folder_has_an_index_too(tmp_path: Path) -> None:
     assert "None has been built yet" in page(tmp_path)
 
 
-def test_movies_are_held_by_the_page_as_far_as_there_is_room(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_page_holds_small_movies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The smallest first; others play from the file beside the page."""
     (tmp_path / "movies").mkdir()
     for name, size in (("S1", 50), ("S2", 20), ("S3", 30)):

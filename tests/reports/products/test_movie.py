@@ -74,9 +74,7 @@ def test_the_same_frames_make_the_same_bytes(tmp_path: Path) -> None:
     assert made("a.mp4") == made("b.mp4")
 
 
-def test_a_movie_is_built_from_the_results_of_its_studies(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_movie_is_built_from_its_studies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "study"
     folder.mkdir()
     made = compressed_study.written(folder, compressed_study.SHIELD)

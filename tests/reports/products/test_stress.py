@@ -38,8 +38,6 @@ def test_the_page_shows_counts_and_what_was_not_solved(counts: Path, tmp_path: P
 
 
 @pytest.mark.parametrize("content", ["", "{}", '{"families": [{"name": "toy"}]}', "[1]"])
-def test_what_the_suite_did_not_write_is_refused(
-    content: str, counts: Path, tmp_path: Path, failing: Failing
-) -> None:
+def test_foreign_counts(content: str, counts: Path, tmp_path: Path, failing: Failing) -> None:
     counts.write_text(content, encoding="utf-8")
     assert str(counts) in failing("stress", tmp_path / "page", "--counts", counts)

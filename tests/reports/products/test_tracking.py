@@ -125,9 +125,7 @@ def test_advice_names_what_is_wrong(track: xr.Dataset, change: dict[str, Any], t
         ({"light": ExposureStatistics(0.6, 0.4, 0.0, 0.0)}, "more light"),
     ],
 )
-def test_a_poor_fit_has_the_cause_that_was_measured(
-    track: xr.Dataset, change: dict[str, Any], told: str
-) -> None:
+def test_causes_of_a_poor_fit(track: xr.Dataset, change: dict[str, Any], told: str) -> None:
     found = of(track)._replace(fastest=0.1)
     lost = np.where(np.array(found.reasons) == "poor_fit", 0.02, 0.0) * np.ones((FRAMES, 1))
     first, *_ = advice.advice(found._replace(lost=lost, **change))

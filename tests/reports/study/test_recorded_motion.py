@@ -47,9 +47,7 @@ def figures(filmed: dict[str, StudyResults]) -> dict[str, Figure]:
 
 
 @pytest.mark.parametrize("name", ["study", "shield", "smile"])
-def test_figures_show_experiment_above_simulation_and_dashed(
-    name: str, figures: dict[str, Figure]
-) -> None:
+def test_figures_show_experiments_above_and_dashed(name: str, figures: dict[str, Figure]) -> None:
     made = figures[name]
     figure_assertions.assert_legible(made)
     places = {text.get_text(): text.get_position() for text in figure_assertions.texts(made)}
@@ -68,7 +66,7 @@ def facts(study: StudyResults) -> dict[str, Fact]:
     return {fact.key: fact for fact in kinds.kind_of(study.problem).facts(study)}
 
 
-def test_a_measured_motion_is_told_beside_the_simulated_one(
+def test_measured_motions_are_told_beside_simulated_ones(
     filmed: dict[str, StudyResults],
 ) -> None:
     shaken, shield, smile = (facts(filmed[name]) for name in ("study", "shield", "smile"))
@@ -95,7 +93,7 @@ def test_the_residual_of_every_recording_is_told(filmed: dict[str, StudyResults]
     assert found["altered_0_correlation"].group == f"Recording “altered_0”: experiment ({LABEL})"
 
 
-def test_the_player_shows_it_under_its_own_load_with_the_residual(
+def test_the_player_shows_it_and_the_residual(
     filmed: dict[str, StudyResults],
 ) -> None:
     study = filmed["study"]
@@ -117,7 +115,7 @@ def test_the_player_shows_it_under_its_own_load_with_the_residual(
     assert all(field["residual"] for field in data["fields"])
 
 
-def test_pages_say_that_it_is_synthetic_unless_it_was_filmed(
+def test_pages_say_that_it_is_synthetic_unless_filmed(
     filmed: dict[str, StudyResults],
 ) -> None:
     study = filmed["smile"]

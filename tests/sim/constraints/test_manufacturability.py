@@ -41,9 +41,7 @@ def random_design(space: structure.DesignSpace, size: float, seed: int = 0) -> n
 
 
 @pytest.mark.parametrize("symmetry", ["none", "C4"])
-def test_sparse_jacobian_is_that_of_the_plain_definition(
-    lattice: structure.Lattice, symmetry: structure.Symmetry
-) -> None:
+def test_jacobian_by_definition(lattice: structure.Lattice, symmetry: structure.Symmetry) -> None:
     space = structure.design_space(lattice, RING, np.array([12]), symmetry)
     constraints = ConstraintVector(space, replace(LIMITS, slots=None))
     design = random_design(space, 0.8)
@@ -59,7 +57,7 @@ def test_sparse_jacobian_is_that_of_the_plain_definition(
     np.testing.assert_allclose(jacobian.toarray(), jax.jit(jax.jacobian(plain))(design), atol=1e-12)
 
 
-def test_jacobian_agrees_with_central_differences(
+def test_jacobian_by_difference(
     space: structure.DesignSpace, constraints: ConstraintVector
 ) -> None:
     design, way = random_design(space, 0.8), random_design(space, 1.0, seed=1)

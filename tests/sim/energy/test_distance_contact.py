@@ -291,9 +291,7 @@ def curvature(vertex: Array, edge: Array) -> Array:
         ((-0.6 * REACH, 0.8 * REACH), (0.6, -0.8)),
     ],
 )
-def test_second_derivatives_do_not_jump(
-    place: tuple[float, float], across: tuple[float, float]
-) -> None:
+def test_curvature_does_not_jump(place: tuple[float, float], across: tuple[float, float]) -> None:
     """Where the nearest feature, the fading or the contact itself begins and ends."""
     edge = np.array([[5.0, 0.0], [0.0, 0.0]])  # its outside is above
     here = [

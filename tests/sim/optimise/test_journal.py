@@ -72,9 +72,7 @@ def test_a_complete_journal_replays_everything(complete: Complete, tmp_path: Pat
     assert (tmp_path / "run").read_bytes() == data
 
 
-def test_a_cut_at_every_byte_of_the_last_record_loses_one_evaluation(
-    complete: Complete, tmp_path: Path
-) -> None:
+def test_a_cut_in_the_last_record_loses_one_evaluation(complete: Complete, tmp_path: Path) -> None:
     data, outcome, _ = complete
     last = record_starts(data)[-2]
     path = tmp_path / "run"
@@ -103,9 +101,7 @@ def test_a_flipped_bit_anywhere_ends_in_the_same_result(
 
 
 @pytest.mark.parametrize(("method", "dies_at"), [*product(METHODS, (0, 1, 5)), ("mma", 11)])
-def test_interrupted_runs_resume_where_they_were(
-    tmp_path: Path, method: Method, dies_at: int
-) -> None:
+def test_interrupted_runs_resume_in_place(tmp_path: Path, method: Method, dies_at: int) -> None:
     whole, loss = Counted(), Counted()
     outcome = run(tmp_path / "whole", whole, method=method)
     with pytest.raises(KeyboardInterrupt):

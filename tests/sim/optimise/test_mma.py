@@ -45,7 +45,7 @@ def test_failed_evaluations_bring_the_asymptotes_closer() -> None:
     np.testing.assert_allclose(found.x, known.optimum, atol=1e-2)
 
 
-def test_a_subproblem_without_solution_ends_the_run_with_the_best_design(
+def test_an_unsolved_subproblem_ends_with_the_best_design(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     solved: list[Separable] = []

@@ -68,7 +68,7 @@ def test_hundreds_of_constraints(method: Method, size: tuple[int, int], accuracy
 
 
 @pytest.mark.parametrize("method", OPTIONS)
-def test_every_simulated_design_is_feasible_and_seen_and_the_accepted_improve(
+def test_simulated_designs_are_feasible_and_seen_and_accepted_ones_improve(
     method: Method,
 ) -> None:
     known, seen = corner(), list[Evaluation]()

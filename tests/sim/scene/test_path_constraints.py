@@ -38,9 +38,7 @@ def margins(posed: sim.Scene) -> PathConstraints:
 @pytest.mark.parametrize(
     ("share", "foil", "count"), [(0.05, None, 4), (None, FOIL, 1), (0.05, FOIL, 5)]
 )
-def test_the_slope_of_the_margins_is_theirs(
-    share: float | None, foil: FoilLimit | None, count: int
-) -> None:
+def test_slopes_of_margins(share: float | None, foil: FoilLimit | None, count: int) -> None:
     posed = scene(share, foil)
     constraint, rng = margins(posed), np.random.default_rng(3)
     design = rng.uniform(-0.5, 0.5, posed.space.n_variables)

@@ -185,9 +185,7 @@ def test_the_evaluator_is_the_derivative_of_the_losses() -> None:
         ({"static": True, "frequency": None}, "static"),
     ],
 )
-def test_the_integrator_fits_the_scene_and_can_be_chosen(
-    changes: dict[str, Any], integrator: str
-) -> None:
+def test_integrators_fit_the_scene_or_are_chosen(changes: dict[str, Any], integrator: str) -> None:
     plan = sim.make_plan(scene(**changes))
     assert plan.integrator == integrator
     assert plan.describe().startswith(f"integrator: {integrator}")

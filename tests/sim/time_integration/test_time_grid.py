@@ -12,9 +12,7 @@ from sim.time_integration import time_grid
     growth=st.floats(1.05, 1.5),
     largest=st.floats(5e-3, 5e-2),
 )
-def test_graded_grids_grow_to_the_largest_step_and_end_on_time(
-    duration: float, first: float, growth: float, largest: float
-) -> None:
+def test_graded_grids(duration: float, first: float, growth: float, largest: float) -> None:
     times = time_grid.graded(duration, first, growth, largest)
     steps = np.diff(times)
     assert times[0] == 0.0

@@ -21,9 +21,7 @@ LATTICES = [
 
 
 @pytest.mark.parametrize(("lattice", "period"), LATTICES, ids=["quads", "kagome"])
-def test_a_larger_cell_folds_the_bands_and_changes_none(
-    lattice: Lattice, period: tuple[int, int]
-) -> None:
+def test_a_larger_cell_only_folds_the_bands(lattice: Lattice, period: tuple[int, int]) -> None:
     small, large = made(lattice, period), made(lattice, (2 * period[0], 2 * period[1]))
     one, other = np.pi * np.linalg.inv(small.period).T
     folded = np.array([a * one + b * other for a in (0, 1) for b in (0, 1)])
