@@ -17,19 +17,12 @@ Words = tuple[str, str]
 
 @dataclass(frozen=True)
 class CloakNumber:
-    """Describes a number of the cloak that should be small.
-
-    Attributes:
-        label: of it.
-        unit: of it.
-        nominal: of a response.
-        of_copies: (noise, sample), of the imperfect copies.
-    """
+    """Describes a number of the cloak that should be small."""
 
     label: str
     unit: str
-    nominal: Callable[[StudyResults], float]
-    of_copies: Callable[[xr.Dataset], xr.DataArray]
+    nominal: Callable[[StudyResults], float]  # of a response
+    of_copies: Callable[[xr.Dataset], xr.DataArray]  # (noise, sample), of the imperfect copies
 
 
 def robust_table(study: StudyResults) -> RobustTable | None:

@@ -29,20 +29,14 @@ class LoadFamily:
     """Spans loads along directions, with amplitudes and frequencies in some ranges.
 
     A load is a place in the unit cube: its direction and amplitude grow linearly along the axes,
-    its frequency by its logarithm.
-
-    Attributes:
-        motion: the drive's; the loss of its amplitude counts as it is, that of another one with
-            the square of the ratio of the two.
-        direction: rad.
-        amplitude: mm.
-        frequency: Hz; None for a motion that has none.
+    its frequency by its logarithm. The loss of the motion's amplitude counts as it is, that of
+    another one with the square of the ratio of the two.
     """
 
-    motion: DIRECTED
-    direction: Range
-    amplitude: Range
-    frequency: Range | None = None
+    motion: DIRECTED  # the drive's
+    direction: Range  # rad
+    amplitude: Range  # mm
+    frequency: Range | None = None  # Hz; None for a motion that has none
 
     @property
     def size(self) -> int:

@@ -48,15 +48,10 @@ class PerturbedStructure:
 
 @dataclass(frozen=True, eq=False)
 class Copies:
-    """Holds the deviations of copies of whatever structure; they may overlap.
+    """Holds the deviations of copies of whatever structure; they may overlap."""
 
-    Attributes:
-        shifts: (n_copies, n_groups, 2) of the vertices, mm.
-        stiffness: (n_copies, 3, n_ligaments) factors of the axial, shear and bending stiffnesses.
-    """
-
-    shifts: Floats
-    stiffness: Floats
+    shifts: Floats  # (n_copies, n_groups, 2) of the vertices, mm
+    stiffness: Floats  # (n_copies, 3, n_ligaments) factors of axial, shear, bending stiffness
 
     def __len__(self) -> int:
         """Counts the copies."""

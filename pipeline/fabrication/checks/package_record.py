@@ -21,15 +21,10 @@ Shapes = Mapping[str, Geometry]
 
 @dataclass(frozen=True)
 class ExpectedParts:
-    """Holds the units of one structure of a design, by label.
+    """Holds the units of one structure of a design, by label."""
 
-    Attributes:
-        polygons: outline as designed by label, in the specimen frame.
-        joints: the ends of each ligament as (label, vertex).
-    """
-
-    polygons: dict[str, Polygon]
-    joints: tuple[tuple[tuple[str, int], tuple[str, int]], ...]
+    polygons: dict[str, Polygon]  # outline as designed, in the specimen frame
+    joints: tuple[tuple[tuple[str, int], tuple[str, int]], ...]  # (label, vertex) of both ends
 
     @cached_property
     def slots(self) -> dict[str, list[int]]:

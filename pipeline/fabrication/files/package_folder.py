@@ -26,23 +26,14 @@ from pipeline.problem import Problem
 
 @dataclass
 class PackageFolder:
-    """Fills a folder with laser/, print/ and fixture/.
-
-    Attributes:
-        folder: to be filled.
-        specimen: to be built.
-        problem: with all its parameters.
-        file: of the problem, for messages.
-        done: called after each of the steps, two more than there are units.
-        contents: ids of the parts in each sheet, plate and fixture, by its path in the folder.
-        prints: what printing each plate and fixture takes, by its path in the folder.
-    """
+    """Fills a folder with laser/, print/ and fixture/."""
 
     folder: Path
     specimen: BuiltSpecimen
     problem: Problem
-    file: str
-    done: Callable[[], object] = lambda: None
+    file: str  # of the problem, for messages
+    done: Callable[[], object] = lambda: None  # after each step, two more than there are units
+    # by path in the folder: ids of the parts in each sheet, plate, fixture; what printing it takes
     contents: dict[str, list[str]] = field(default_factory=dict)
     prints: dict[str, PrintEstimate] = field(default_factory=dict)
 

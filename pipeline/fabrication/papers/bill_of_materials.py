@@ -37,31 +37,19 @@ _KINDS = {"laser": "sheet", "print": "plate", "fixture": "fixture"}  # of files,
 
 @dataclass(frozen=True)
 class BillRow:
-    """Holds one line of the bill. Lengths in mm, areas in mm^2, volumes in mm^3, masses in g.
+    """Holds one line of the bill. Lengths in mm, areas in mm^2, volumes in mm^3, masses in g."""
 
-    Attributes:
-        item: unit, shim, ligament, pin, sheet, plate, fixture, foil (how shims may be handled) or
-            total.
-        id: of the part, the units that a ligament joins, or path of the file in the package.
-        count: pieces.
-        area, volume: of one piece; the volume as if it were solid.
-        mass: of one piece at the problem's areal density (units) or solid (shims).
-        length, width, height: of one piece.
-        files: files that hold it.
-        note: anything else, in words.
-    """
-
-    item: str
-    id: str
+    item: str  # unit, shim, ligament, pin, sheet, plate, fixture, foil (ways to handle it), total
+    id: str  # of the part, the units that a ligament joins, or path of the file in the package
     count: int
-    area: float | None = None
-    volume: float | None = None
-    mass: float | None = None
+    area: float | None = None  # of one piece, as all that follows
+    volume: float | None = None  # as if it were solid
+    mass: float | None = None  # at the problem's areal density (units) or solid (shims)
     length: float | None = None
     width: float | None = None
     height: float | None = None
-    files: str = ""
-    note: str = ""
+    files: str = ""  # that hold it
+    note: str = ""  # anything else, in words
 
 
 def write_bill(

@@ -39,24 +39,15 @@ _CIRCLE = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
 
 @dataclass(frozen=True)
 class Curve:
-    """Holds one entity of a drawing.
+    """Holds one entity of a drawing."""
 
-    Attributes:
-        part: id of the part that it belongs to, "" if there is none.
-        layer: its layer.
-        kind: its name in the file's format.
-        points: vertices (n, 2) in mm, a closed curve without the repeated first one.
-        closed: whether the file says that it ends where it starts.
-        own_colour: whether it has another colour than its layer's.
-        tabs: (k, 2, 2) ends of the places of an outer cut that the file leaves uncut.
-    """
-
-    part: str
+    part: str  # id of the part that it belongs to, "" if there is none
     layer: str
-    kind: str
-    points: Floats
-    closed: bool
-    own_colour: bool = False
+    kind: str  # its name in the file's format
+    points: Floats  # vertices (n, 2) in mm, a closed curve without the repeated first one
+    closed: bool  # the file says that it ends where it starts
+    own_colour: bool = False  # another one than its layer's
+    # (k, 2, 2) ends of the places of an outer cut that the file leaves uncut
     tabs: Floats = field(default_factory=lambda: np.empty((0, 2, 2)))
 
     @property

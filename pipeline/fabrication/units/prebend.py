@@ -22,16 +22,12 @@ from sim.core import Floats
 class PreBend(NamedTuple):
     """Tells how a shim is bent before any load.
 
-    Attributes:
-        angles: of either slot against the ligament, from its first unit to its second, rad,
-            counter-clockwise; the natural angles of a ligament whose foil is straight by itself.
-        strain: largest one at the foil's faces.
-        moment: largest one, N mm.
+    Its angles are the natural ones of a ligament whose foil is straight by itself.
     """
 
-    angles: tuple[float, float]
-    strain: float
-    moment: float
+    angles: tuple[float, float]  # of slots against the ligament, first unit to second, rad, ccw
+    strain: float  # largest one at the foil's faces
+    moment: float  # largest one, N mm
 
 
 def prebend(first: Slot, second: Slot, settings: Fabrication) -> PreBend:

@@ -27,23 +27,14 @@ _STRAIGHT = np.deg2rad(0.01)
 
 @dataclass(frozen=True)
 class Corner:
-    """Marks a vertex of a unit that takes a slot.
-
-    Attributes:
-        vertex: number of the unit's vertex.
-        ligament: id of the ligament there.
-        along: (2,) unit vector of the ligament, pointing into the unit.
-        length: of the ligament, mm.
-        turn: of the slot against the ligament, rad, where it was designed; None if it is free.
-        other: the slot at the ligament's other end; None as long as there is none.
-    """
+    """Marks a vertex of a unit that takes a slot."""
 
     vertex: int
-    ligament: int
-    along: Floats
-    length: float
-    turn: float | None = None
-    other: Slot | None = None
+    ligament: int  # id of the one there
+    along: Floats  # (2,) unit vector of the ligament, pointing into the unit
+    length: float  # of the ligament, mm
+    turn: float | None = None  # of the slot against the ligament, rad, if designed; None if free
+    other: Slot | None = None  # at the ligament's other end, once there is one
 
     @property
     def straight(self) -> bool:

@@ -19,26 +19,17 @@ _HAIR = 1e-6
 
 @dataclass(frozen=True)
 class UnitNetwork:
-    """Holds one structure of a design, before anything is built of it.
+    """Holds one structure of a design, before anything is built of it."""
 
-    Attributes:
-        numbers: (n,) ids of the units that are present.
-        polygons: as designed, by id.
-        labels: by id.
-        index: (i, j) by id.
-        ligaments: (id, (unit, vertex), (unit, vertex), unit vector from the first to the second).
-        clamped, driven: ids.
-        turns: angles of the slots at both ends of ligaments against these, rad, by id; of those
-            that were designed.
-    """
-
-    numbers: tuple[int, ...]
-    polygons: dict[int, Polygon]
-    labels: dict[int, str]
-    index: dict[int, tuple[int, int]]
+    numbers: tuple[int, ...]  # ids of the units that are present
+    polygons: dict[int, Polygon]  # as designed, by id
+    labels: dict[int, str]  # by id
+    index: dict[int, tuple[int, int]]  # (i, j) by id
+    # id, (unit, vertex) at both ends, unit vector from the first to the second
     ligaments: tuple[tuple[int, tuple[int, int], tuple[int, int], Floats], ...]
-    clamped: tuple[int, ...]
+    clamped: tuple[int, ...]  # ids
     driven: tuple[int, ...]
+    # angles, rad, of designed slots at both ends of ligaments against these, by id
     turns: dict[int, tuple[float, float]] = field(default_factory=dict)
 
 
