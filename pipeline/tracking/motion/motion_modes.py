@@ -39,7 +39,9 @@ class MotionModes(NamedTuple):
     rest: Floats  # (frames, units) what is left
 
 
-def separate_modes(motion: Floats, near: Ints, noise: float) -> MotionModes:
+def separate_modes(
+    motion: Floats, near: Ints, noise: float, start: Floats | None = None
+) -> MotionModes:
     """Separates the shapes of one degree of freedom.
 
     What is missing is filled in time first, then by the shapes themselves, until it stays.
@@ -48,9 +50,10 @@ def separate_modes(motion: Floats, near: Ints, noise: float) -> MotionModes:
         motion: (frames, units), NaN where missing.
         near: (units, k) the nearest ones of each.
         noise: standard deviation that the motions have at least.
+        start: (frames, units) values of what is missing to begin with.
     """
     known = np.isfinite(motion)
-    full = _filled(motion)
+    full = filled(motion) if start is None else np.where(known, motion, start)
     for _ in range(_FILLINGS):
         left, values, right = np.linalg.svd(full, full_matrices=False)
         floor = max(_EMERGING * float(np.median(values)), noise * np.sqrt(full.shape).sum())
@@ -72,7 +75,7 @@ def _leading(height: Floats, vectors: Floats, near: Ints) -> int:
     return len(vectors)
 
 
-def _filled(motion: Floats) -> Floats:
+def filled(motion: Floats) -> Floats:
     """Fills missing values by those before and after, in time, about what all units do together."""
     known = np.isfinite(motion)
     if known.all():

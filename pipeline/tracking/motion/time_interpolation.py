@@ -1,31 +1,46 @@
-"""Interpolates poses in time, from when rows and exposures showed them to the frames' times."""
+"""Computes poses at the frames' times, from when rows and exposures showed them."""
 
-import itertools
+import warnings
 from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.tracking.motion import motion_modes
 from sim.core import Floats, Ints, Reals
 
 _KNOTS, _FEWEST = 7, 4
-"""Poses that a polynomial passes through, at most and at least."""
+"""Frames that a polynomial passes through, at most and at least."""
+_ROUNDS, _SETTLED = 8, 0.05
+"""Rounds of the motion between frames, at most; a change, over the noise, that ends them."""
+_PART = 400
+"""Frames that are looked at together, beside some before and after."""
+_FEW = 9
+"""Units, below which shapes that they share do not stand out."""
 
 
-class _Interpolated(NamedTuple):
-    """Holds what polynomials of rising order tell of a unit."""
+class _Carried(NamedTuple):
+    """Holds poses (frames, units) at frames' times."""
 
-    known: Ints  # (n,) frames in which it is seen
-    pose: Floats  # (orders, n, 3) at the frames' times
-    growth: Floats  # (orders, n, 3) variance over that of the poses seen
+    pose: Floats  # of one degree of freedom
+    growth: Floats  # of their variance, over that of the poses seen
+    left: Floats  # square of what the highest order changes
 
 
 def at_frame_times(
-    motion: Reals, sigma: Reals, time: Floats, late: Floats, bend: Reals, averaged: int = 1
+    motion: Reals,
+    sigma: Reals,
+    time: Floats,
+    late: Floats,
+    bend: Reals,
+    near: Ints,
+    averaged: int = 1,
 ) -> tuple[Reals, Reals, Reals]:
     """Computes poses (frames, units, 3) at frames' times (frames,), by polynomials in time.
 
-    A picture shows the mean over its exposure: x + bend x'', to second order. Polynomials pass
-    through the poses that are nearest in time, and have the order with the least error: noise, and
+    A picture shows the mean over its exposure, x + bend x'' to second order, at its rows' times.
+    What the units did in between is told by the few shapes in which they move together, nearly
+    without noise: x(t) = seen - (m(t + late) + bend m''(t + late) - m(t)) of the motion m in these.
+    Polynomials pass through the nearest frames, and have the order with the least error: noise, and
     what the highest changes.
 
     Args:
@@ -34,35 +49,64 @@ def at_frame_times(
         time: of the frames, s; middle of the exposure of the middle row.
         late: (frames, units) by how much later each pose was seen, s.
         bend: (frames, units, 3) share of the acceleration in each pose, s^2.
+        near: (units, k) the nearest ones of each.
         averaged: number of frames that the reference is the mean of.
 
     Returns:
         Poses; their uncertainties by that of the poses they are made of; and the variance by what
         is not known of the motion in between, and of the reference.
     """
-    out, spread, missed = motion.copy(), sigma.copy(), np.zeros_like(motion)
+    out, grown, left = motion.copy(), np.ones_like(motion), np.zeros_like(motion)
+    for begin in range(0, len(motion), _PART):
+        first = max(begin - _KNOTS, 0)
+        part = slice(first, begin + _PART + _KNOTS)
+        core = slice(begin, begin + _PART)
+        if len(time[part]) <= _FEWEST:
+            continue
+        lag = np.where(np.isfinite(late[part]), late[part], 0.0)
+        for dof in range(motion.shape[2]):
+            shown, told = (values[part, :, dof].astype(float) for values in (motion, sigma))
+            found = _carried(shown, told, time[part], lag, bend[part, :, dof].astype(float), near)
+            for values, new in zip((out, grown, left), found, strict=True):
+                values[core, :, dof] = new[begin - first :][:_PART]
     own, rest = averaged / (averaged + 1), 1 / (averaged + 1)
-    error = np.zeros((_KNOTS - _FEWEST + 1, *motion.shape[::2]))
-    for turn, unit in itertools.product(range(2), range(motion.shape[1])):
-        found = _unit_interpolated(motion[:, unit], time, late[:, unit], bend[:, unit])
-        if found is None:
-            continue
-        known, pose, growth = found
-        told = sigma[known, unit].astype(float)
-        change = (pose[-1] - pose[:-1]) ** 2 - growth[-1] * told**2
-        if turn == 0:  # all units tell of the order
-            error[: len(change), known] += change / told**2 + growth[:-1]
-            error[len(change) :, known] = np.inf
-            continue
-        best = np.minimum(np.argmin(error[:, known], axis=0), len(change) - 1)
-        at = best, np.arange(len(known))[:, None], np.arange(3)
-        left, grown, first = np.maximum(change[at], 0.0), growth[at], known < averaged
-        out[known, unit] = pose[at]
-        spread[known, unit] = told * np.sqrt(own * grown + rest)
-        if first.any():
-            left += left[first].mean(axis=0) + told**2 * rest * (grown[first].mean(axis=0) - 1)
-        missed[known, unit] = np.maximum(left, 0.0)
-    return out, spread, missed
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # some units are not seen at rest
+        origin = np.nan_to_num([np.nanmean(one[:averaged], axis=0) for one in (left, grown - 1)])
+    missed = left + origin[0] + np.nan_to_num(sigma) ** 2 * rest * origin[1]
+    return out, sigma * np.sqrt(own * grown + rest), np.maximum(missed, 0.0)
+
+
+def _carried(
+    shown: Floats, told: Floats, time: Floats, late: Floats, bend: Floats, near: Ints
+) -> _Carried:
+    """Carries poses (frames, units) to the frames' times.
+
+    The motion in between is that of the poses themselves, and so found in rounds.
+    """
+    weights = [_weights(time, late, bend, knots) for knots in _orders(len(time))]
+    noise = float(np.nanmedian(told)) if np.isfinite(told).any() else 1.0
+    pose, together, share = shown, None, np.ones(shown.shape[1])
+    for _ in range(_ROUNDS):
+        if shown.shape[1] < _FEW:
+            together = motion_modes.filled(pose)
+        else:
+            found = motion_modes.separate_modes(pose, near, noise, together)
+            together, share = found.amplitude @ found.shape, np.sum(found.shape**2, axis=0)
+        change = np.array(
+            [
+                np.einsum("fuk,fuk->fu", w, np.take_along_axis(together[:, :, None], at, 0))
+                for at, w in weights
+            ]
+        )
+        growth = np.array([share * np.sum(weight**2, axis=2) for _, weight in weights])
+        off = (change[:-1] - change[-1]) ** 2 - growth[-1] * told**2
+        error = np.nansum(off / told**2 + np.where(np.isfinite(told), growth[:-1], 0.0), axis=2)
+        best = np.argmin(error, axis=0), np.arange(len(time))
+        before, pose = pose, shown - change[best]
+        if np.sqrt(np.nanmean((pose - before) ** 2)) < _SETTLED * noise:
+            break
+    return _Carried(pose, 1 + growth[best], np.nan_to_num(np.maximum(off[best], 0.0)))
 
 
 def middle_speed(motion: Reals, time: Floats, frame: int) -> Floats:
@@ -77,42 +121,24 @@ def middle_speed(motion: Reals, time: Floats, frame: int) -> Floats:
     return np.asarray(np.linalg.norm(np.tensordot(weight, motion[near, :, :2], 1), axis=1))
 
 
-def _unit_interpolated(
-    motion: Reals, time: Floats, late: Floats, bend: Reals
-) -> _Interpolated | None:
-    """Passes polynomials of rising order through the poses (frames, 3) of a unit, if they suffice.
+def _orders(frames: int) -> range:
+    return range(_FEWEST, min(_KNOTS + 1, frames) + 1)
 
-    Each has one knot more than the one before; the last only tells what it changes.
+
+def _weights(time: Floats, late: Floats, bend: Floats, knots: int) -> tuple[Ints, Floats]:
+    """Returns the frames (frames, units, knots) about each pose, and their weights in its change.
+
+    That is the polynomial's value at its own time, with bend times its second derivative, less the
+    value at the frame's.
     """
-    known = np.flatnonzero(np.isfinite(motion[:, 0]))
-    if len(known) <= _FEWEST:
-        return None
-    seen, now = time[known] + late[known], time[known]
-    shown, share = motion[known].astype(float), bend[known].astype(float)
-    most = min(_KNOTS + 1, len(known))
-    found = [_passed(seen, now, shown, share, knots) for knots in range(_FEWEST, most + 1)]
-    pose, growth = (np.array(values) for values in zip(*found, strict=True))
-    return _Interpolated(known, pose, growth)
-
-
-def _nearest(seen: Floats, now: Floats, knots: int) -> Ints:
-    """Returns the numbers (n, knots) of those in a row that are about each time."""
-    first = np.arange(len(seen)) - (knots - 1) // 2
-    first -= (knots % 2 == 0) & (seen > now)
-    return np.asarray(np.clip(first, 0, len(seen) - knots)[:, None] + np.arange(knots))
-
-
-def _passed(
-    seen: Floats, now: Floats, shown: Floats, bend: Floats, knots: int
-) -> tuple[Floats, Floats]:
-    """Returns polynomials' values less bend times second derivatives (n, 3), and their growth."""
-    near = _nearest(seen, now, knots)
-    apart = seen[near] - now[:, None]
-    unit = float(np.ptp(seen)) / (len(seen) - 1)
+    frame = np.arange(len(time))[:, None]
+    first = frame - (knots - 1) // 2 - ((knots % 2 == 0) & (late < 0))
+    near = np.clip(first, 0, len(time) - knots)[..., None] + np.arange(knots)
+    unit = float(np.ptp(time)) / (len(time) - 1)
+    apart = (time[near] - (time[:, None] + late)[..., None]) / unit
     order = np.arange(knots)
-    powers = (apart[:, None] / unit) ** order[:, None]
     wanted = np.zeros((knots, 2))
     wanted[0, 0], wanted[2, 1] = 1.0, 2.0 / unit**2
-    value, second = np.moveaxis(np.linalg.solve(powers, wanted[None]), -1, 0)
-    weight = value[..., None] - bend[:, None] * second[..., None]
-    return np.einsum("nkd,nkd->nd", weight, shown[near]), np.sum(weight**2, axis=1)
+    solved = np.linalg.solve(apart[..., None, :] ** order[:, None], wanted[None, None])
+    weight = solved[..., 0] + bend[..., None] * solved[..., 1]
+    return near, weight - (near == frame[..., None])

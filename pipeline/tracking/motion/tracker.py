@@ -34,6 +34,8 @@ _PARTS = np.linspace(0.0, 1.0, 9)
 _TELLING, _FEW_QUICK, _MANY_QUICK, _ENOUGH = 5.0, 3, 48, 5
 """Motion from frame to frame that tells of the exposure, px; units that must make it, and that are
 looked at, at most; frames."""
+_MIXED = 2.5
+"""Pixels over which the sampling of a template averages its noise already."""
 _PAST = 3
 """Frames before one that tell of its velocities."""
 _GLARE = 0.4
@@ -206,7 +208,8 @@ class Tracker:
     def _measure_exposure(self, image: Picture, fits: PoseFits) -> None:
         """Takes the exposure that leaves the least residuals of the units that are quick enough.
 
-        It is the median of what the first such frames tell.
+        It is the median of what the first such frames tell. What a blur takes of the template's own
+        noise, by the inverse of its length, is no sign of it.
         """
         way = np.linalg.norm(self._velocity[:, :2], axis=1) * self._interval / self._pixel
         quick = self._accepted(fits, _SHARE, sharp=False) & (way > _TELLING)
@@ -216,11 +219,13 @@ class Tracker:
         ids = np.flatnonzero(quick)
         quick[:] = False
         quick[ids[:: -(-len(ids) // _MANY_QUICK)]] = True
-        left = []
+        left, noise = [], self._fitter.templates.noise
         for part in _PARTS:
             self.exposure = part * self._interval
             again = self._fit(image, fits.pose, fits.photometry, quick)
-            left.append(float(np.nanmean((again.noise / again.photometry[:, 0])[quick] ** 2)))
+            rest = (again.noise / self._photometry[:, 0])[quick] ** 2
+            smoothed = noise**2 / np.sqrt(_MIXED**2 + (part * way[quick]) ** 2)
+            left.append(float(np.nanmean(rest - smoothed)))
         best = int(np.clip(np.argmin(left), 1, len(left) - 2))
         near = slice(best - 1, best + 2)  # the blur's variance grows with the square of its length
         bend, slope, _ = np.polyfit(_PARTS[near] ** 2, left[near], 2)

@@ -121,7 +121,7 @@ def track_video(
     if setup.readout or exposure:
         late = row_times(motion, specimen, calibration, setup)
         bend = exposure**2 / 24 * shares[..., _OF_DOF]
-        motion, sigmas, missed = at_frame_times(motion, sigmas, time, late, bend, rest)
+        motion, sigmas, missed = at_frame_times(motion, sigmas, time, late, bend, near, rest)
         off = np.sqrt(missed[..., :2].max(axis=-1)) / calibration.pixel
         usual = np.median(off, axis=1, keepdims=True)  # one unit alone has met with noise
         unsure = (off > _UNSURE) & (usual > _UNSURE / 5)

@@ -10,6 +10,7 @@ RATE, PACE, NOISE = 30.0, 15.0, 0.002
 UNITS = 200
 SIGMA = np.full((30, UNITS, 3), NOISE * np.sqrt(2.0))
 """Of displacements: the reference has the noise of a frame."""
+NEAR = (np.arange(UNITS)[:, None] + [-2, -1, 1]) % UNITS
 
 
 def swing(time: np.ndarray) -> np.ndarray:
@@ -27,7 +28,7 @@ def test_poses_are_those_at_the_frames_times_and_sigma_holds(
     error = NOISE * np.random.default_rng(1).normal(size=(30, UNITS, 3))
     seen = mean * swing(time[:, None] + late)[..., None] + error
     given = seen - seen[0]
-    pose, sigma, missed = at_frame_times(given, SIGMA, time, late, bend)
+    pose, sigma, missed = at_frame_times(given, SIGMA, time, late, bend, NEAR)
     off = pose - pose[0] - (swing(time) - swing(time[:1]))[:, None, None]
     raw = given - (swing(time) - swing(time[:1]))[:, None, None]
     assert np.sqrt(np.mean(off[1:] ** 2)) < 0.35 * np.sqrt(np.mean(raw[1:] ** 2))
@@ -35,13 +36,13 @@ def test_poses_are_those_at_the_frames_times_and_sigma_holds(
     assert 0.7 < honest < 1.4
 
 
-def test_units_seen_in_few_frames_stay_as_seen() -> None:
+def test_a_unit_that_rests_in_few_frames_stays_where_it_is() -> None:
     time, late, bend = np.arange(8) / RATE, np.full((8, 1), 0.01), np.zeros((8, 1, 3))
     seen = np.where(np.arange(8)[:, None, None] < 4, 1.0, np.nan) * np.ones((8, 1, 3))
-    pose, sigma, missed = at_frame_times(seen, np.ones_like(seen), time, late, bend)
+    pose, sigma, missed = at_frame_times(seen, np.ones_like(seen), time, late, bend, NEAR[:1])
     np.testing.assert_array_equal(pose, seen)
-    assert (sigma == 1).all()
-    assert (missed == 0).all()
+    assert ((sigma >= 1) & (sigma < 1.5)).all()
+    assert np.isfinite(missed).all()
 
 
 def test_velocities_are_those_of_the_polynomial_through_the_frames_seen() -> None:
