@@ -10,7 +10,7 @@ RATE, PACE, NOISE = 30.0, 15.0, 0.002
 UNITS = 200
 SIGMA = np.full((30, UNITS, 3), NOISE * np.sqrt(2.0))
 """Of displacements: the reference has the noise of a frame."""
-NEAR = (np.arange(UNITS)[:, None] + [-2, -1, 1]) % UNITS
+NEAR = (np.arange(UNITS)[:, None] + np.array([-2, -1, 1])) % UNITS
 
 
 def swing(time: np.ndarray) -> np.ndarray:
