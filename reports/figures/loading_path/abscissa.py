@@ -7,10 +7,10 @@ import xarray as xr
 
 from pipeline.problem import Problem, driven_units
 from pipeline.problem.sections import Kagome, Lattice, ListedNetwork, single_drives
-from reports.figures.loading_path import measures
+from reports.figures.loading_path.drive_response import driven_displacement
 from sim.core import Floats
 
-_LOADS = {
+LOADS = {
     "force": ("Applied force", "$F$", "N", 1.0),
     "torque": ("Applied moment", "$M$", "N mm", 1.0),
     "rotation": ("Applied rotation", r"$\theta$", "°", 180.0 / np.pi),
@@ -53,7 +53,7 @@ class Abscissa:
 
     def at(self, sample: int) -> str:
         """Returns the value at a sample in words, with the paper's label of it."""
-        words = f"{self.values[sample]:.3g} {self.unit}"
+        words = f"{self.values[sample]:.3g} {self.unit}".replace(" °", "°")
         if self.strain is None:
             return words
         share = 100.0 * self.strain * self.values[sample] / self.values[-1]
@@ -64,13 +64,13 @@ def abscissa_of(problem: Problem, response: xr.Dataset) -> Abscissa:
     """Returns the path of a response."""
     static, kind = problem.static, single_drives(problem.drive)[0].kind
     paper, time = problem.report.paper, response["time"].values
-    name, symbol, unit, factor = _LOADS.get(kind, ("Applied displacement", "$u$", "mm", 1.0))
+    name, symbol, unit, factor = LOADS.get(kind, ("Applied displacement", "$u$", "mm", 1.0))
     if not static:
         name, symbol, unit, values = "Time", "$t$", "s", time
-    elif kind in _LOADS:
+    elif kind in LOADS:
         values = factor * float(response["amplitude"][0]) * time / time[-1]
     else:
-        values = driven_displacement(response)
+        values = path_displacement(problem, response)
     return Abscissa(
         name=name,
         symbol=symbol,
@@ -82,9 +82,9 @@ def abscissa_of(problem: Problem, response: xr.Dataset) -> Abscissa:
     )
 
 
-def driven_displacement(response: xr.Dataset, case: int = 0) -> Floats:
+def path_displacement(problem: Problem, response: xr.Dataset, case: int = 0) -> Floats:
     """Returns displacement (n_times,) of the driven units along the drive's direction, mm."""
-    along = measures.driven_displacement(response).isel(structure=0, case=case)
+    along = driven_displacement(problem, response).isel(structure=0, case=case)
     return np.asarray(along.values, dtype=float)
 
 

@@ -18,6 +18,7 @@ from reports.figures.loading_path.abscissa import (
     load_names,
     structures,
 )
+from reports.figures.loading_path.drive_response import drive_response
 from reports.figures.loading_path.measures import Measure
 from reports.panels import measured_overlay
 from reports.study import RedesignResults, StudyResults, display_name
@@ -183,30 +184,23 @@ def contraction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
     _sides(axes, study)
 
 
-def reaction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
-    """Draws force of the drive, and of the load cell where there is one."""
-    force = measures.reaction(study.response)
-    _plain_panel(axes, study.problem, path, force, "force (N)")
-    if "intact" in structures(study.response) and path.static:
-        off = over_cases(study.problem, measures.reaction_error(force)).sel(structure="cloaked")
+def drive_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
+    """Draws what the drive's units answer with, and the force of a load cell where there is one."""
+    response, problem = drive_response(study.problem), study.problem
+    values = response.of(study.response)
+    _plain_panel(axes, problem, path, values, response.axis)
+    if response.held and "intact" in structures(study.response) and path.static:
+        off = over_cases(problem, measures.reaction_error(values)).sel(structure="cloaked")
         axes.text(
             0.97, 0.05, f"cloaked off by {float(off):.1%}", color=style.CLOAKED,
             transform=axes.transAxes, ha="right", fontsize=style.SMALL,
         )  # fmt: skip
     if path.static:
-        _traced(axes, study, path)
+        if response.key == "reaction":
+            _traced(axes, study, path)
         _eigenvalues(axes, study, path)
     measured.forces(axes, study)
-    if study.problem.objective.target == "rest":  # or another panel has told it
-        _sides(axes, study)
-
-
-def displacement_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
-    """Draws how far the driven units go under a load."""
-    moved = measures.driven_displacement(study.response)
-    _plain_panel(axes, study.problem, path, moved, "displacement (mm)")
-    _eigenvalues(axes, study, path)
-    if study.problem.objective.target == "rest":
+    if problem.objective.target == "rest":  # or another panel has told it
         _sides(axes, study)
 
 

@@ -32,6 +32,7 @@ from reports.figures.loading_path.abscissa import (
     structures,
 )
 from reports.figures.loading_path.curves import over_cases
+from reports.figures.loading_path.drive_response import drive_response
 from reports.study import StudyResults, display_name, from_dataset
 from sim.core import Floats
 
@@ -262,20 +263,18 @@ def contraction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
 
 
 def reaction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
-    """Yields force of the drive at the end of the path, or how far its load goes."""
+    """Yields what the units of the drive answer with at the end of the path."""
     if not path.static:
         return
     names, where = structures(study.response), path.at(-1)
-    if not path.displaces:
-        moved = over_cases(study.problem, measures.driven_displacement(study.response))
-        yield from _each(study, "displacement", moved.isel(time=-1), names, where=where)
-        return
-    every = measures.reaction(study.response)
-    force = over_cases(study.problem, every).isel(time=-1)
+    response = drive_response(study.problem)
+    every = response.of(study.response)
+    ends = over_cases(study.problem, every).isel(time=-1)
     for name in names:
-        yield from _each(study, "reaction", force, [name], where=where)
-        yield from _each_load(study, f"reaction_{name}", "Reaction", every, name, "N")
-    if "intact" in names:
+        key = response.key
+        yield from _each(study, key, ends, [name], where=where)
+        yield from _each_load(study, f"{key}_{name}", response.title, every, name, response.unit)
+    if "intact" in names and response.held:
         off = over_cases(study.problem, measures.reaction_error(every))
         yield from _each(study, "reaction_error", off)
 

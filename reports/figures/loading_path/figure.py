@@ -12,11 +12,13 @@ from reports.base import Table, prose, style
 from reports.facts import JUMPED, Fact
 from reports.figures.loading_path import curves, measures, tables
 from reports.figures.loading_path.abscissa import (
+    LOADS,
     Abscissa,
     abscissa_of,
     lattice_size,
     structures,
 )
+from reports.figures.loading_path.drive_response import drive_response
 from reports.figures.loading_path.snapshot_grid import SnapshotLayout, snapshots
 from reports.figures.loading_path.structure_panels import rest_panel, shade_of
 from reports.page import PageText, study_text
@@ -91,10 +93,9 @@ def design_panels(
 
 
 def _size(drive: Any) -> str:  # noqa: ANN401  (any drive that has an amplitude)
-    """Tells the amplitude of a drive with its unit, angles in degrees."""
-    if drive.unit == "rad":
-        return f"{np.degrees(drive.amplitude):.4g}°"
-    return f"{drive.amplitude:.4g} {drive.unit}"
+    """Tells the amplitude of a drive with its symbol and unit."""
+    _, symbol, unit, factor = LOADS.get(drive.kind, ("", "$A$", drive.unit, 1.0))
+    return f"{symbol} = {factor * drive.amplitude:.4g} {unit}".replace(" °", "°")
 
 
 def _at_rest(figure: Figure, study: StudyResults) -> Iterator[Axes]:
@@ -103,7 +104,7 @@ def _at_rest(figure: Figure, study: StudyResults) -> Iterator[Axes]:
     lattice, drives = study.problem.lattice, single_drives(study.problem.drive)
     size = f"{lattice_size(lattice)} units, $s$ = {lattice.spacing:g} mm"
     sizes = [_size(drive) for drive in drives if hasattr(drive, "amplitude")]
-    notes = [size, f"$A$ = {', '.join(sizes)}" if sizes else "", ""]
+    notes = [size, ", ".join(sizes), ""]
     left = (3 - len(names)) * (side + 0.6) / 2
     for k, name in enumerate(names):
         x = left + k * (side + 0.6)
@@ -136,15 +137,12 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
 
 
 def _answer(study: StudyResults, path: Abscissa) -> Curve:
-    """Returns the curve of what the driven units do: displacement under a load, else force."""
-    stiffness = _PROSE["eigenvalue"] if path.static else ""
-    if path.static and not path.displaces:
-        words, panel = _PROSE["displacement"] + stiffness, curves.displacement_panel
-        return "Displacement", lambda axes: panel(axes, study, path), f"{words}.", ()
-    words = _PROSE["force"] + stiffness
-    if np.isfinite(study.response["snap_load"]).any():
+    """Returns the curve of what the driven units answer with."""
+    response = drive_response(study.problem)
+    words = _PROSE[response.key] + (_PROSE["eigenvalue"] if path.static else "")
+    if path.displaces and np.isfinite(study.response["snap_load"]).any():
         words += _PROSE["snaps"]
-    return "Reaction", lambda axes: curves.reaction_panel(axes, study, path), f"{words}.", ()
+    return response.title, lambda axes: curves.drive_panel(axes, study, path), f"{words}.", ()
 
 
 def _side_by_side(shown: Sequence[Curve], top: float) -> Iterator[Panel]:

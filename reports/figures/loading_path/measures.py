@@ -1,4 +1,4 @@
-"""Measures how far structures are from what they should do; contraction and reaction."""
+"""Measures how far structures are from what they should do, and their contraction."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,7 +8,6 @@ import xarray as xr
 
 from pipeline.comparison import middle_units
 from pipeline.problem import Problem
-from reports.study import DRIVEN
 
 
 @dataclass(frozen=True)
@@ -115,32 +114,10 @@ def contraction(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     return rise.sel(unit=bottom).mean("unit") - rise.sel(unit=top).mean("unit")
 
 
-def driven_displacement(response: xr.Dataset) -> xr.DataArray:
-    """Finds the mean displacement in mm of the driven units along the drive's direction."""
-    driven = response["displacement"].isel(unit=response["support"].values == DRIVEN)
-    return _along(driven.mean("unit"), response)
-
-
-def _along(vector: xr.DataArray, response: xr.Dataset) -> xr.DataArray:
-    """Returns the part (structure, case, time) along the drive's direction."""
-    angle = np.radians(response["direction"])
-    along: xr.DataArray = np.cos(angle) * vector.sel(dof="ux") + np.sin(angle) * vector.sel(
-        dof="uy"
-    )
-    return along.transpose("structure", "case", "time")
-
-
-def reaction(response: xr.Dataset) -> xr.DataArray:
-    """Finds force in N that the drive exerts along its direction, on all driven units together."""
-    held = response["reaction_force"].isel(unit=response["support"].values == DRIVEN)
-    return _along(held.sum("unit"), response)
-
-
 def reaction_error(force: xr.DataArray) -> xr.DataArray:
     """Computes how far forces of structures are off the intact one's, relative to its last.
 
-    The forces (structure, case, time) are those of `reaction`, N; root mean squares are over the
-    time.
+    The forces (structure, case, time) may be moments; root mean squares are over the time.
     """
     intact = force.sel(structure="intact")
     squares: xr.DataArray = ((force - intact) ** 2).mean("time")

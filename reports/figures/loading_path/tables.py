@@ -10,6 +10,7 @@ from reports.facts import Columns, history, vertices
 from reports.figures.loading_path import measures, monte_carlo
 from reports.figures.loading_path.abscissa import abscissa_of, load_names, structures
 from reports.figures.loading_path.curves import over_cases
+from reports.figures.loading_path.drive_response import drive_response
 from reports.study import StudyResults
 
 
@@ -47,17 +48,24 @@ def path(study: StudyResults) -> Columns:
     measure = measures.measure_of(problem)
     columns: Columns = {"time_s": response["time"].values}
     if way.static:
-        columns["displacement_mm"] = way.values
+        name = "displacement" if way.displaces else way.name.lower().replace(" ", "_")
+        columns[_column(name, way.unit)] = way.values
+    answer = drive_response(problem)
     series = {
-        f"{measure.key}_{'1' if measure.unit == '1' else measure.unit}": measure.of(response),
+        _column(measure.key, measure.unit): measure.of(response),
         "contraction_mm": measures.contraction(problem, response),
-        "reaction_N": measures.reaction(response),
+        _column(answer.key, answer.unit): answer.of(response),
         "strain_energy_Nmm": response["strain_energy"],
         "contact_energy_Nmm": response["contact_energy"],
         "min_void_angle_rad": response["min_void_angle"],
         "eigenvalue_N_per_mm": response["eigenvalue"],
     }
     return columns | by_structure(study, series)
+
+
+def _column(name: str, unit: str) -> str:
+    """Names a column by its quantity and unit."""
+    return f"{name}_{unit.replace(' ', '').replace('°', 'deg')}"
 
 
 def copies(study: StudyResults, made: xr.Dataset) -> Columns:
@@ -69,7 +77,7 @@ def copies(study: StudyResults, made: xr.Dataset) -> Columns:
     columns: Columns = {
         "noise": noise.ravel(),
         "sample": sample.ravel(),
-        f"{measure.key}_{'1' if measure.unit == '1' else measure.unit}": values.values.ravel(),
+        _column(measure.key, measure.unit): values.values.ravel(),
         "reaction_N": made["reaction"].isel(time=-1).values.ravel(),
     }
     for name in ("loss", "min_void_angle", "clashes", "redrawn", "status"):

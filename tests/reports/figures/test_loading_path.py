@@ -12,13 +12,20 @@ from matplotlib.patches import FancyArrowPatch
 from pipeline.comparison import middle_units
 from pipeline.posing import law_comparison
 from pipeline.problem import Output
-from pipeline.problem.sections import Paper, RotationDrive, TimeSeriesDrive
+from pipeline.problem.sections import (
+    ForceDrive,
+    Paper,
+    RotationDrive,
+    TimeSeriesDrive,
+    TorqueDrive,
+)
 from reports.base import style
 from reports.facts import checks, fact_records
 from reports.facts.copies import spreads
 from reports.figures import kinds
 from reports.figures.loading_path import abscissa, figure, measures, monte_carlo
 from reports.figures.loading_path import facts as path_facts
+from reports.figures.loading_path.drive_response import drive_response
 from reports.figures.loading_path.structure_panels import rest_panel
 from reports.figures.robust_table import robust_table
 from reports.figures.shielding import facts as shielding
@@ -89,7 +96,7 @@ def test_contraction_of_seven_middle_columns_and_force_on_driven_units(
     for name, pull in compressed_study.DRAW.items():
         assert float(found.sel(structure=name)) == pytest.approx(pull * waist)
     assert middle_units(smile.problem, "bottom") == list(range(4, 11))
-    forces = measures.reaction(smile.response).isel(case=0)
+    forces = drive_response(smile.problem).of(smile.response).isel(case=0)
     np.testing.assert_allclose(forces.isel(time=-1), list(compressed_study.FORCE.values()))
     np.testing.assert_allclose(forces.isel(time=0), 0.0)
 
@@ -315,15 +322,33 @@ def test_a_measured_motion_has_arrows_along_its_largest_displacement(smile: Stud
         assert y == pytest.approx(same)
 
 
-def test_amplitudes_of_rotations_are_told_in_degrees(smile: StudyResults) -> None:
-    turn = RotationDrive.model_validate(
-        {"kind": "rotation", "units": "right", "amplitude": "1 deg"}
-    )
-    asked = smile.problem.model_copy(update={"drive": turn})
-    drawn = Figure()
-    list(figure._at_rest(drawn, dataclasses.replace(smile, problem=asked)))
+@pytest.mark.parametrize(
+    ("drive", "name", "amplitude", "shown", "axis", "key"),
+    [
+        (ForceDrive, "force", "2 N", "$F$ = 2 N", "displacement (mm)", "displacement_cloaked"),
+        (TorqueDrive, "torque", "3 N mm", "$M$ = 3 N mm", "rotation (°)", "turn_cloaked"),
+        (RotationDrive, "rotation", "1 deg", r"$\theta$ = 1°", "moment (N mm)", "moment_cloaked"),
+    ],
+)
+def test_a_drive_is_answered_by_what_is_conjugate_to_it(
+    smile: StudyResults,
+    drive: type[ForceDrive | TorqueDrive | RotationDrive],
+    name: str,
+    amplitude: str,
+    shown: str,
+    axis: str,
+    key: str,
+) -> None:
+    way = {"directions": ["180 deg"]} if name == "force" else {}
+    given = {"kind": name, "units": "right", "amplitude": amplitude, **way}
+    asked = drive.model_validate(given)
+    problem = smile.problem.model_copy(update={"drive": asked})
+    study = dataclasses.replace(smile, problem=problem)
+    drawn = made(study)
     words = [text.get_text() for axes in drawn.axes for text in axes.texts]
-    assert "$A$ = 1°" in [*words, *(text.get_text() for text in drawn.texts)]
+    assert shown in [*words, *(text.get_text() for text in drawn.texts)]
+    assert axis in [axes.get_ylabel() for axes in drawn.axes]
+    assert key in values(study)
 
 
 @pytest.mark.parametrize("law", ["angle", "geometric"])
