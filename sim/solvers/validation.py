@@ -145,7 +145,7 @@ def inadmissible(
     if isinstance(law, VoidAngleContact):
         motion = states.reshape(len(states), -1, 3)
         return topology.smallest_void_angle(values.void, motion) <= law.barrier_angle
-    contacts = contact_arrays(law, values, topology.n_units)
+    contacts = contact_arrays(law, values, topology.n_dofs // 3)
     found = np.array([find(state, contacts) < 0 for state in states], dtype=bool)
     raise_new_pairs(contacts)
     return found

@@ -35,8 +35,11 @@ PUSHED = np.array([[FORCE, FREE, DISPLACEMENT]])
 LOADS = np.linspace(0.1, 1.0, 10)
 
 
-def rig(motion: MotionLaw, control: object, units: object = MIDDLE) -> Rig:
-    return Rig(rotating_squares(), CORNERS, np.asarray(units), motion, control=np.asarray(control))
+def rig(
+    motion: MotionLaw, control: object, units: object = MIDDLE, distance: float | None = None
+) -> Rig:
+    driven = np.asarray(units)
+    return Rig(rotating_squares(), CORNERS, driven, motion, distance, np.asarray(control))
 
 
 def solved(made: Rig, solver: Solver) -> Floats:
@@ -66,8 +69,9 @@ def test_moment_of_a_rotation_gives_that_rotation() -> None:
     np.testing.assert_allclose(static(rig(series, [[FORCE] * 3])), path, atol=1e-8)
 
 
+@pytest.mark.parametrize("distance", [None, 0.5])
 @pytest.mark.parametrize("kind", ["implicit", "explicit"])
-def test_force_of_a_motion_gives_that_motion(kind: str) -> None:
+def test_force_of_a_motion_gives_that_motion(kind: str, distance: float | None) -> None:
     """The force is that of the ligaments, and of the unit's own inertia and damping."""
     times, pulse = np.linspace(0.0, 0.02, 2001), Pulse(2.0, 2e-3, delay=8e-3)
 
@@ -76,7 +80,7 @@ def test_force_of_a_motion_gives_that_motion(kind: str) -> None:
             return ExplicitSolver(made.topology, times[-1], 2000, times)
         return ImplicitSolver(made.topology, times, times, tolerance=1e-8)
 
-    moved = rig(pulse, SIDEWAYS)
+    moved = rig(pulse, SIDEWAYS, distance=distance)
     motion = solved(moved, solver(moved))
     pulled = observe(moved.topology, moved.values, motion).force_on(MIDDLE)[:, 0]
 
@@ -90,7 +94,8 @@ def test_force_of_a_motion_gives_that_motion(kind: str) -> None:
     mass, damping = moved.values.mass[12, 0], moved.values.damping[12, 0]
     force = pulled + mass * acceleration + damping * velocity
     assert np.abs(mass * acceleration).max() > 0.1 * np.abs(force).max()
-    pushed = rig(TimeSeries(times, force[:, None] * [1.0, 0.0, 0.0]), PUSHED)
+    series = TimeSeries(times, force[:, None] * [1.0, 0.0, 0.0])
+    pushed = rig(series, PUSHED, distance=distance)
     np.testing.assert_allclose(solved(pushed, solver(pushed)), motion, atol=2e-3)
 
 
