@@ -8,6 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import pdist, squareform
 
+from pipeline.posing.perturbed import noises
 from pipeline.posing.to_scene import material_of
 from pipeline.problem import Problem
 from pipeline.problem.sections import SingleDrive, Triangular, case_count, single_drives
@@ -33,6 +34,8 @@ HELD = 0.08
 STEP = 2e-5
 """Seconds of a step of SQP besides, over the square of the units to redesign: within a factor of
 two and a half in the eight studies of a static path."""
+LATER = {True: (28.0, 13.0), False: (4.0, 3.0)}
+"""Evaluations that a case of a sweep and an imperfect copy cost, static or not (fig4, fig2)."""
 AFTER = 24
 """Evaluations of a motion in time that its steps, its response and their checks cost (fig7)."""
 
@@ -48,22 +51,30 @@ def cost_line(asked: Problem, scene: Scene) -> str:
     evaluations = sum(budget.values())
     seconds = START + (evaluations + (0 if scene.loads.static else AFTER)) * cost.seconds
     seconds += STEP * len(scene.design.cloak) ** 2 * budget.get("sqp", 0)
-    longest = f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
     return (
         f"{scene.lattice.n_units} units, {len(scene.design.cloak)} of them to redesign;"
         f" {cost.unknowns} unknowns; {len(scene.loads.cases)} load case(s);"
         f" about {max(0.3, cost.memory / 1e9):.2g} GB;"
-        f" {evaluations} evaluations of the design, about {longest} on one core"
-        f"{''.join(_followed_by(asked))}"
+        f" {evaluations} evaluations of the design, about {_span(seconds)} on one core"
+        f"{_followed_by(asked, scene, cost.seconds)}"
     )
 
 
-def _followed_by(asked: Problem) -> Iterator[str]:
-    """Yields what is simulated besides, and takes a time of its own."""
-    if asked.sweep is not None:
-        yield f"; then {case_count(asked.sweep)} cases of the sweep"
-    if asked.robustness is not None:
-        yield f"; then {asked.robustness.samples} imperfect copies"
+def _span(seconds: float) -> str:
+    return f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
+
+
+def _followed_by(asked: Problem, scene: Scene, evaluation: float) -> str:
+    """Tells what is simulated besides, and its time by that of an evaluation, s."""
+    constants, made = asked.report.measured_constants, asked.robustness
+    cases = 0 if asked.sweep is None else case_count(asked.sweep)
+    draws = 0 if constants is None else constants.samples
+    copies = 0 if made is None else made.samples * len(noises(made, scene.lattice.spacing))
+    parts = {"cases of the sweep": cases, "measured constants": draws, "imperfect copies": copies}
+    words = ", ".join(f"{count} {what}" for what, count in parts.items() if count)
+    case, copy = LATER[scene.loads.static]
+    seconds = ((cases + draws) * case + copies * copy) * evaluation
+    return f"; then {words}, about {_span(seconds)}" if words else ""
 
 
 def doubts(asked: Problem, scene: Scene) -> Iterator[str]:

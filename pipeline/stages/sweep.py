@@ -72,7 +72,7 @@ def _simulate(
     found: dict[int, SweepResult],
     book: CaseLog,
 ) -> None:
-    """Adds what is missing to ``found`` and to the casebook."""
+    """Adds what is missing to ``found`` and to the case log."""
     failed = 0
     with cli.progress(sum(len(group.numbers) for group in groups), "cases") as bar:
         for group in groups:

@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, ListedColormap, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from sim.core import Floats
 
@@ -156,6 +157,14 @@ def note(
     """Writes a small text beside a point, `shift` points from it."""
     settings: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": SMALL} | style
     return axes.annotate(text, at, xytext=shift, textcoords="offset points", **settings)
+
+
+def log_values(axes: Axes) -> None:
+    """Makes the y axis logarithmic, with plain numbers; what is not positive is left out."""
+    axes.set_yscale("log", nonpositive="mask")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def letter(figure: Figure, left: float, top: float, name: str, title: str = "") -> None:

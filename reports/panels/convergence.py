@@ -4,7 +4,7 @@ import matplotlib.patheffects as effects
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import MaxNLocator
 
 from reports.base import style
 
@@ -18,11 +18,8 @@ def loss_history(axes: Axes, design: xr.Dataset, label: str = r"Loss $J$") -> No
         history = design.sel({"method": method})
         colour = style.METHOD_COLOURS.get(str(method), style.GREY)
         _history(axes, history, colour, str(method).upper())
-    axes.set_yscale("log")
+    style.log_values(axes)
     axes.set(xlabel="Evaluation", ylabel=label, xlim=(0, None))
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_ylim(0.55 * float(design["loss"].min()), None)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), ncols=2, columnspacing=1.2)

@@ -7,7 +7,6 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from pipeline import datasets, problem
 from pipeline.problem import Problem
@@ -107,10 +106,7 @@ def _transmission(axes: Axes, data: xr.Dataset, asked: Problem) -> None:
     )
     low, high = axes.get_ylim()
     if low <= 0 or high / low > _DECADES:
-        axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
-        axes.yaxis.set_major_formatter("{x:g}")
-        axes.yaxis.set_minor_formatter(NullFormatter())
+        style.log_values(axes)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, columnspacing=1.0)
 
 

@@ -94,18 +94,22 @@ def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Meas
     _jumps(axes, path, values, response)
     if study.redesign is not None and study.redesign.changed:
         _second(axes, study, measure, study.redesign)
-    still = "Unloaded" if problem.objective.target == "rest" else display_name(problem, "intact")
-    axes.plot(path.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label=f"{still}: zero")
+    vanishes = _vanishes(problem, values)
+    if not vanishes:
+        still = (
+            "Unloaded" if problem.objective.target == "rest" else display_name(problem, "intact")
+        )
+        axes.plot(path.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label=f"{still}: zero")
     if study.scatter is not None:
         _bands(axes, study, path, measure, study.scatter)
     measured.bands(axes, study, measure.key)
     measured.measured_curves(axes, study, path, measure.of, names)
     legend = axes.legend(loc="upper left", handlelength=1.2)
     room = 0.1 * len(legend.get_texts())
-    if _vanishes(problem, values):
+    if vanishes:
         seen = values.sel(structure=names).isel(time=slice(1, None)).values
         low, high = 0.5 * float(np.nanmin(seen[seen > 0.0])), 1.1 * float(np.nanmax(seen))
-        axes.set_yscale("log")
+        style.log_values(axes)
         axes.set_ylim(low, high * (high / low) ** (room / (1.0 - room)))
     else:
         axes.set_ylim(0, (1.1 + room) * axes.get_ylim()[1])

@@ -83,7 +83,7 @@ def _against(axes: Axes, axis: SweepAxis, measure: SweepMeasure, *, joined: bool
     if measure.level is not None:
         axes.axhline(measure.level, color=style.GREY, lw=0.6, ls=(0, (4, 2)), zorder=1)
     if _is_wide(measure):
-        axes.set_yscale("log")
+        style.log_values(axes)
     _name(axes, axis, "x")
     axes.set_ylabel(measure.label)
 
