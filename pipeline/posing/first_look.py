@@ -34,6 +34,8 @@ HELD = 0.08
 STEP = 2e-5
 """Seconds of a step of SQP besides, over the square of the units to redesign: within a factor of
 two and a half in the eight studies of a static path."""
+FAMILY = 12
+"""Simulations of an evaluation for a family of loads, searches and all (Figure 2)."""
 LATER = {True: (28.0, 13.0), False: (4.0, 0.7)}
 """Evaluations that a case of a sweep costs, and a load case of an imperfect copy, static or not:
 measured on Figure 4, and on Figures 2 and 7."""
@@ -50,7 +52,9 @@ def cost_line(asked: Problem, scene: Scene) -> str:
         first = optimiser.angle.evaluations if optimiser.angle else 0
         budget["sqp"] = optimiser.descents * (first + budget["sqp"])
     evaluations = sum(budget.values())
-    seconds = START + (evaluations + (0 if scene.loads.static else AFTER)) * cost.seconds
+    seconds = START + (evaluations + (0 if scene.loads.static else AFTER)) * (
+        cost.seconds * _simulations(asked)
+    )
     seconds += STEP * len(scene.design.cloak) ** 2 * budget.get("sqp", 0)
     return (
         f"{scene.lattice.n_units} units, {len(scene.design.cloak)} of them to redesign;"
@@ -59,6 +63,14 @@ def cost_line(asked: Problem, scene: Scene) -> str:
         f" {evaluations} evaluations of the design, about {_span(seconds)} on one core"
         f"{_followed_by(asked, scene, cost.seconds)}"
     )
+
+
+def _simulations(asked: Problem) -> int:
+    """Counts the simulations of an evaluation, each of all loads of the drive."""
+    if asked.objective.loads is not None:
+        return FAMILY
+    robust = asked.objective.robust
+    return 1 if robust is None else max(1, robust.copies) * (1 + len(robust.loads))
 
 
 def _span(seconds: float) -> str:

@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw
 
 from pipeline.posing import cost_line, doubts, scene_of
 from pipeline.problem import load
+from pipeline.problem.sections import Robust
 from pipeline.runtime import ROOT
 from reports.__main__ import main
 from sim.scene import estimate_cost, sample_times
@@ -41,6 +42,13 @@ def test_every_descent_and_the_one_before_it_cost(tmp_path: Path) -> None:
     text = path.read_text().replace("law: angle", more[0]).replace("optimiser: {", more[1])
     path.write_text(text)
     assert "14 evaluations of the design" in cost_line(load(path), scene_of(load(path), tmp_path))
+
+
+def test_imperfect_copies_of_a_robust_design_take_time(tmp_path: Path) -> None:
+    asked = load(static.write(tmp_path, static.HEART, size=30))
+    objective = asked.objective.model_copy(update={"robust": Robust(copies=64)})
+    robust, scene = asked.model_copy(update={"objective": objective}), scene_of(asked, tmp_path)
+    assert cost_line(asked, scene) != cost_line(robust, scene)
 
 
 def test_the_cost_grows_as_the_factor_does(tmp_path: Path) -> None:
