@@ -152,7 +152,7 @@ def table(folder: Path = IMAGES) -> str:
         errors[:, 2] = correlated(known) - [one.motion for one in known]
     else:
         named = "pyvale (not installed)"
-        LOG.warning("warning: %s is not there: `make bench-tracking` installs pyvale", PYVALE)
+        LOG.warning("%s is not there: `make bench-tracking` installs pyvale", PYVALE)
     errors[..., 2] = np.angle(np.exp(1j * errors[..., 2]))
     told = "found | bias x, y px; deg | spread x, y px; deg"
     lines = [

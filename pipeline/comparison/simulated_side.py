@@ -46,7 +46,7 @@ def simulate_specimen(
     lattice, size = structure.scene.lattice, track.sizes["unit"]
     displacement = spread(made.displacement, lattice, size, axis=1)
     if made.failure is not None:
-        LOG.warning("warning: the simulation ended early: %s", made.failure)
+        LOG.warning("the simulation ended early: %s", made.failure)
         nothing = np.empty((0, *displacement.shape))
         return SimulatedSide(
             displacement, made.drive_force @ way, nothing, nothing[..., 0, 0], (made.failure,)

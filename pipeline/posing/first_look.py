@@ -74,7 +74,9 @@ def _simulations(asked: Problem) -> int:
 
 
 def _span(seconds: float) -> str:
-    return f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
+    units = (("days", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0))
+    name, size = next(each for each in units if seconds > 1.5 * each[1] or each[1] == 1.0)
+    return f"{seconds / size:.0f} {name}"
 
 
 def _followed_by(asked: Problem, scene: Scene, evaluation: float) -> str:

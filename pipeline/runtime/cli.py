@@ -142,6 +142,7 @@ def _told(error: Exception, args: argparse.Namespace) -> int:
 def _logging(log: Path | None, *, quiet: bool) -> Iterator[None]:
     """Sends messages of the project to stderr, and all that there is to the log."""
     console = logging.StreamHandler()
+    console.setFormatter(_Words())
     console.setLevel(logging.ERROR if quiet else logging.INFO)
     console.addFilter(lambda record: not getattr(record, "drawn", False))
     handlers: list[logging.Handler] = [console]
@@ -159,6 +160,15 @@ def _logging(log: Path | None, *, quiet: bool) -> Iterator[None]:
             for logger in loggers:
                 logger.removeHandler(handler)
             handler.close()
+
+
+class _Words(logging.Formatter):
+    """Writes messages as they are; warnings are called so."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """See ``logging.Formatter``."""
+        told = super().format(record)
+        return f"warning: {told}" if record.levelno == logging.WARNING else told
 
 
 def _log_file(log: Path) -> logging.Handler:

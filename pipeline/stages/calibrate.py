@@ -46,7 +46,7 @@ def _fit(path: Path, args: argparse.Namespace) -> None:
     except SimulationError as error:
         raise simulation_fault(error, path) from error
     for line in filter(None, made.attrs["warnings"].split("\n")):
-        LOG.warning("warning: %s", line)
+        LOG.warning("%s", line)
     parents = {each.name: path.parent / each.file for each in asked.data if each.file is not None}
     origin = provenance.of_recording(
         asked.model_dump_json(), parents, synthetic=asked.synthetic, role="calibration"

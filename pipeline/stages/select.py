@@ -33,7 +33,7 @@ def work(args: argparse.Namespace) -> None:
         designs[method] = design
     best = min(designs, key=lambda method: _merit(designs[method]))
     if overlaps := int(designs[best]["overlaps"]):
-        LOG.warning("warning: %d pairs of units overlap in the shipped design", overlaps)
+        LOG.warning("%d pairs of units overlap in the shipped design", overlaps)
     for method, design in designs.items():
         LOG.info("%s: loss %.5g", method, float(design["best_loss"]))
     LOG.info("shipped: the design by %s", best)

@@ -139,7 +139,7 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     datasets.write(made, args.out, "track", origin)
     write_track_table(made.assign_attrs(origin), args.out.with_suffix(".csv"))
     if isinstance(track.ended, KeyboardInterrupt):
-        LOG.warning("warning: the %d frames until then are kept in %s", len(track.time), args.out)
+        LOG.warning("the %d frames until then are kept in %s", len(track.time), args.out)
         raise track.ended
     if not args.no_report:
         words = ["--track", str(args.out), "--video", str(video), "--out-dir"]
@@ -196,7 +196,7 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
     with found_in(source), cli.progress(frame_count(video), "tracking") as bar:
         track = track_video(shown, outlines_of_design(design), scale, bar.update, setup)
     if has_uneven_intervals(track.time):
-        LOG.warning("warning: the frame rate varies; times are the file's own stamps")
+        LOG.warning("the frame rate varies; times are the file's own stamps")
     lost = float(np.mean(track.quality != 0))
     LOG.info(
         "%d frames, %d units; %.2f %% not seen; median uncertainty %.4f mm, %.3f deg;"

@@ -44,7 +44,7 @@ def remove_camera_motion(
     ends = np.nanmax(np.abs(common[:, :2])) / pixel
     if ends > _MOVED:
         LOG.warning(
-            "warning: all clamped units move together, by up to %.2f px: the camera moved, or what"
+            "all clamped units move together, by up to %.2f px: the camera moved, or what"
             " holds them; `camera: follows supports` takes it out",
             ends,
         )

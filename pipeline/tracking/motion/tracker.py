@@ -334,7 +334,7 @@ class Tracker:
             if not self._relocaliser.in_view(best.pose).all():
                 return False
             LOG.warning(
-                "warning: nothing of the specimen was seen before %.4g s, and its lattice looks the"
+                "nothing of the specimen was seen before %.4g s, and its lattice looks the"
                 " same when it is turned: it is taken to be turned as little as may be",
                 self._time,
             )

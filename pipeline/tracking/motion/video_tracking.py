@@ -103,7 +103,7 @@ def track_video(
     calibration = calibrate_camera(shown.image, specimen, ways[0], setup)
     check_outlines(specimen, ways[0], calibration)
     if (seen := orientation_text(calibration.camera)) != "upright":
-        LOG.warning("warning: the specimen is %s; motions are in the design's own frame", seen)
+        LOG.warning("the specimen is %s; motions are in the design's own frame", seen)
     offset = _centre_offset(shown.image, specimen, ways[0], calibration, setup.kind)
     tracker = _tracker(shown, specimen, calibration, setup)
     rows, ended = _track_frames(shown.frames, tracker, tell)
@@ -128,7 +128,7 @@ def track_video(
         if unsure.any():
             motion[unsure], qualities[unsure] = np.nan, POOR_FIT
             LOG.warning(
-                "warning: %.0f %% of the poses are lost, as more moves from frame to frame than"
+                "%.0f %% of the poses are lost, as more moves from frame to frame than"
                 " tells where units were when other rows were read: film at a higher rate, or rest"
                 " in the first frame",
                 100 * unsure.mean(),

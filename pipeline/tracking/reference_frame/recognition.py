@@ -104,12 +104,12 @@ def check_outlines(
         )
     if not there.all():
         LOG.warning(
-            "warning: %d units reach out of the first frame; where a whole row does, the lattice"
+            "%d units reach out of the first frame; where a whole row does, the lattice"
             " may lie a unit aside from where it is taken to be",
             np.count_nonzero(~there),
         )
     if strange.any():
-        LOG.warning("warning: %s in the first frame", _named(specimen, strange))
+        LOG.warning("%s in the first frame", _named(specimen, strange))
 
 
 def agreeing_outlines(specimen: SpecimenOutlines, outlines: PoseFits) -> Mask:
