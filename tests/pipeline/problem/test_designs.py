@@ -50,8 +50,7 @@ def test_a_design_that_is_not_there(name: str, remedy: str) -> None:
 
 def test_the_workflow_knows_them() -> None:
     designs = [Study("fig3", f"quick.{number}") for number in (1, 2)]
-    assert families()[Study("fig3", "quick")] == designs
-    assert together()["fig3@quick"] == designs
+    assert families()[Study("fig3", "quick")] == together()["fig3@quick"] == designs
     assert [str(study) for study in together()["fig3"]] == ["fig3@1", "fig3@2", "fig3@3", "fig3@4"]
 
 

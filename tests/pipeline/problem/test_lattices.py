@@ -1,6 +1,5 @@
 """Kagome lattices and lattices from files, through the same chain as squares."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -69,11 +68,7 @@ def as_dxf(path: Path, lattice: Lattice) -> None:
     drawing.saveas(path)
 
 
-WRITERS: dict[str, Callable[[Path, Lattice], None]] = {
-    "csv": as_csv,
-    "nc": as_netcdf,
-    "dxf": as_dxf,
-}
+WRITERS = {"csv": as_csv, "nc": as_netcdf, "dxf": as_dxf}
 
 
 def from_file(folder: Path, name: str) -> Path:
@@ -117,23 +112,28 @@ def test_a_drawing_runs_as_the_lattice_that_it_shows(tmp_path: Path) -> None:
 
 
 KAGOME = """  kind: kagome
-  columns: 5
-  rows: 5
+  columns: {size}
+  rows: {size}
   spacing: 15 mm
   ligament_length: 2.25 mm
   bias: 1.5 mm
 """
 
 
-def test_a_kagome_lattice_from_problem_to_response(tmp_path: Path) -> None:
-    hole = (
-        "void: { disc: { centre: [37.5 mm, 37.5 mm], radius: 8 mm } }\n"
-        "cloak: { disc: { centre: [37.5 mm, 37.5 mm], radius: 28 mm } }\n" + MIMIC
-    )
-    path = write(tmp_path, hole, size=5, amplitude=2.0)
-    text = path.read_text().replace(QUADS, KAGOME).replace("block_angle: 30", "block_angle: 10")
+def kagome(folder: Path, size: int, void: float, cloak: float) -> Path:
+    """A problem of size x size cells; discs of these radii (mm) in the middle."""
+    centre = f"centre: [{7.5 * size} mm, {7.5 * size} mm]"
+    discs = {"void": void, "cloak": cloak}.items()
+    hole = [f"{name}: {{ disc: {{ {centre}, radius: {r} mm }} }}\n" for name, r in discs]
+    path = write(folder, "".join(hole) + MIMIC, size=5, amplitude=2.0)
+    text = path.read_text().replace(QUADS, KAGOME.format(size=size))
+    text = text.replace("block_angle: 30", "block_angle: 10")
     path.write_text(text.replace("edge_length: 3 mm", "edge_length: 1 mm"))
-    shipped, moved = run(path)
+    return path
+
+
+def test_a_kagome_lattice_from_problem_to_response(tmp_path: Path) -> None:
+    shipped, moved = run(kagome(tmp_path, 5, 8, 28))
     assert shipped.sizes["vertex"] == 3
     assert shipped.sizes["unit"] == 50
     void = np.flatnonzero(shipped["region"] == 3)
@@ -147,14 +147,7 @@ def test_a_kagome_lattice_from_problem_to_response(tmp_path: Path) -> None:
 
 
 def test_the_authors_kagome_lattice(tmp_path: Path) -> None:
-    hole = (
-        "void: { disc: { centre: [112.5 mm, 112.5 mm], radius: 35 mm } }\n"
-        "cloak: { disc: { centre: [112.5 mm, 112.5 mm], radius: 75 mm } }\n" + MIMIC
-    )
-    path = write(tmp_path, hole, size=5)
-    kagome = KAGOME.replace(": 5\n", ": 15\n")
-    path.write_text(path.read_text().replace(QUADS, kagome))
-    problem = load(path)
+    problem = load(kagome(tmp_path, 15, 35, 75))
     lattice = problem.lattice.network()
     assert (lattice.n_units, lattice.n_ligaments) == (450, 225 + 2 * 14 * 15)
     assert len(selected_units("left", problem.lattice)) == 30

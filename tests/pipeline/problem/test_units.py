@@ -43,24 +43,7 @@ def test_any_text_is_read_or_refused(text: str) -> None:
         assert math.isfinite(parse_quantity(text, units.LENGTH))
 
 
-@pytest.mark.parametrize(
-    ("name", "zero", "vanishes"),
-    [
-        ("Length", "0 mm", False),
-        ("Duration", "0 s", False),
-        ("Frequency", "0 Hz", False),
-        ("Density", "0 kg/m^2", False),
-        ("Force", "0 N", False),
-        ("Modulus", "0 MPa", False),
-        ("Stiffness", "0 N/mm", False),
-        ("BendingStiffness", "0 N mm/rad", False),
-        ("ContactStiffness", "0 N mm/rad^2", False),
-        ("Gap", "0 mm", True),
-        ("Delay", "0 s", True),
-        ("Damping", "0 kg/s", True),
-        ("RotaryDamping", "0 kg m^2/s", True),
-    ],
-)
+@cases("problem", "name, zero, vanishes")
 def test_quantities_that_may_be_zero(name: str, zero: str, vanishes: bool) -> None:
     reader: TypeAdapter[float] = TypeAdapter(getattr(quantities, name))
     if vanishes:
