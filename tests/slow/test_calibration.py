@@ -23,17 +23,7 @@ from pipeline.calibration.fit_constants import fit_settled
 from pipeline.calibration.least_squares import FitModel
 from pipeline.runtime import ROOT
 from sim.core import Floats
-from tests.pipeline.calibration import test_loads
-from tests.pipeline.calibration.specimens import (
-    STIFFNESS,
-    TRUTH,
-    decay_set,
-    described,
-    force_sets,
-    loaded,
-    synthesised,
-    written,
-)
+from tests.pipeline.calibration import specimens, test_loads
 
 SPECIMENS = ROOT / "experiments/calibration/specimens"
 SEEDS = 100
@@ -54,7 +44,9 @@ class Case(NamedTuple):
 
 
 def forces_case(folder: Path) -> Case:
-    asked = loaded(folder, described(force_sets(points=12), STIFFNESS))
+    asked = specimens.loaded(
+        folder, specimens.described(specimens.force_sets(points=12), specimens.STIFFNESS)
+    )
     begin, true = inputs.start_constants(asked), computed_sets.true_constants(asked)
     clean: list[tuple[force_displacement.ForceTest, Floats, float]] = []
     for each in asked.data:
@@ -79,7 +71,9 @@ def forces_case(folder: Path) -> Case:
 
 
 def decay_case(folder: Path) -> Case:
-    asked = loaded(folder, described([decay_set()], ["damping_ratio"]))
+    asked = specimens.loaded(
+        folder, specimens.described([specimens.decay_set()], ["damping_ratio"])
+    )
     true, each = computed_sets.true_constants(asked), asked.data[0]
     assert isinstance(each, inputs.FreeDecay)
     assert each.virtual is not None
@@ -96,7 +90,7 @@ def squeezed_case(folder: Path, noise: float = 1.0) -> Case:
     """Equilibria, which tell ratios of stiffness."""
     begin = {"bending_stiffness": "1.7 N mm/rad", "axial_stiffness": "100 N/mm"}
     error = {"displacement": f"{0.003 * noise} mm", "rotation": f"{0.02 * noise} deg"}
-    return _track_case(folder, "squeezed.yaml", "6 Hz", error, TRUTH | begin, list(begin))
+    return _track_case(folder, "squeezed.yaml", "6 Hz", error, specimens.TRUTH | begin, list(begin))
 
 
 def shaken_case(folder: Path, noise: float = 1.0) -> Case:
@@ -104,7 +98,7 @@ def shaken_case(folder: Path, noise: float = 1.0) -> Case:
     begin = {"shear_stiffness": "1.0 N/mm", "damping": {"ratio": 0.015}}
     error = {"displacement": f"{0.02 * noise} mm", "rotation": f"{0.1 * noise} deg"}
     wanted = ["shear_stiffness", "damping_ratio"]
-    return _track_case(folder, "shaken.yaml", "300 Hz", error, TRUTH | begin, wanted)
+    return _track_case(folder, "shaken.yaml", "300 Hz", error, specimens.TRUTH | begin, wanted)
 
 
 def _track_case(
@@ -118,7 +112,7 @@ def _track_case(
         "bias": error,
         "virtual": {"rate": rate, "noise": error, "bias": error},
     }
-    asked = loaded(folder, described([track], wanted, material=begin_of))
+    asked = specimens.loaded(folder, specimens.described([track], wanted, material=begin_of))
     begin, true, each = (
         inputs.start_constants(asked),
         computed_sets.true_constants(asked),
@@ -195,8 +189,9 @@ def test_a_track_of_little_noise_tells_constants_within_1_percent(
 
 def test_the_load_cell_of_a_track_tells_the_scale(tmp_path: Path) -> None:
     shutil.copy(test_loads.SPECIMENS / "squeezed.yaml", tmp_path)
-    path = synthesised(
-        tmp_path, described([test_loads.track()], test_loads.WANTED, material=test_loads.START)
+    path = specimens.synthesised(
+        tmp_path,
+        specimens.described([test_loads.track()], test_loads.WANTED, material=test_loads.START),
     )
     file = tmp_path / "data/motion.nc"
     seen = datasets.read(file, "track")
@@ -219,9 +214,9 @@ TRACK = """
 def test_stiffness_ratios_from_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.copy(SPECIMEN, tmp_path / "squeezed.yaml")
     track = yaml.safe_load(TRACK)
-    start = TRUTH | {"bending_stiffness": "1.8 N mm/rad"}
-    text = described([track], ["bending_stiffness", "damping_ratio"], material=start)
-    path = written(tmp_path, text)
+    start = specimens.TRUTH | {"bending_stiffness": "1.8 N mm/rad"}
+    text = specimens.described([track], ["bending_stiffness", "damping_ratio"], material=start)
+    path = specimens.written(tmp_path, text)
     folder, out = tmp_path / "data", tmp_path / "found.nc"
     words = ["synthesise", str(path), "--out-dir", str(folder), "--quiet"]
     assert run_stage("calibrate", words) == 0

@@ -10,16 +10,9 @@ from ezdxf.filemanagement import new
 from pydantic import TypeAdapter
 
 from pipeline import datasets
+from pipeline import problem as problems
 from pipeline.__main__ import run_stage
 from pipeline.posing import scene_of
-from pipeline.problem import (
-    canonical_json,
-    cloak_units,
-    from_canonical,
-    interest_units,
-    sections,
-    void_units,
-)
 from pipeline.problem.outlines.network_files import COLUMNS
 from pipeline.problem.reading import load
 from pipeline.problem.sections import selected_units
@@ -93,12 +86,12 @@ def test_a_listed_lattice_is_the_one_that_was_listed(tmp_path: Path, suffix: str
     WRITERS[suffix](tmp_path / f"x.{suffix}", SQUARES)
     problem = load(from_file(tmp_path, f"x.{suffix}"))
     plain = load(write(tmp_path, HOLE, size=5))
-    for ids in (void_units, cloak_units, interest_units):
+    for ids in (problems.void_units, problems.cloak_units, problems.interest_units):
         assert ids(problem) == ids(plain)
     for side in ("left", "right", "top", "bottom", "corners", "centre"):
         wanted = selected_units(side, plain.lattice)
         assert selected_units(side, problem.lattice) == wanted
-    found = from_canonical(canonical_json(problem)).lattice.network()
+    found = problems.from_canonical(problems.canonical_json(problem)).lattice.network()
     np.testing.assert_allclose(np.sort(found.vertices, axis=0), np.sort(SQUARES.vertices, axis=0))
     np.testing.assert_array_equal(found.ligament_units, SQUARES.ligament_units)
 
@@ -151,7 +144,9 @@ def test_the_authors_kagome_lattice(tmp_path: Path) -> None:
     lattice = problem.lattice.network()
     assert (lattice.n_units, lattice.n_ligaments) == (450, 225 + 2 * 14 * 15)
     assert len(selected_units("left", problem.lattice)) == 30
-    assert len(void_units(problem)) + len(cloak_units(problem)) == pytest.approx(157, abs=4)
+    assert len(problems.void_units(problem)) + len(problems.cloak_units(problem)) == pytest.approx(
+        157, abs=4
+    )
 
 
 def test_corners_that_are_words_are_told(tmp_path: Path) -> None:
@@ -190,7 +185,7 @@ def test_ligaments_of_a_list_may_have_stiffnesses_of_their_own(tmp_path: Path) -
     told = "\n".join([f"{header},bending (N mm/rad)", *filled])
     (tmp_path / "x.csv").write_text(told)
     problem = load(from_file(tmp_path, "x.csv"))
-    scene = scene_of(from_canonical(canonical_json(problem)), tmp_path)
+    scene = scene_of(problems.from_canonical(problems.canonical_json(problem)), tmp_path)
     first = 1 + next(i for i, row in enumerate(rows) if row.startswith("lig")) // 2 * 2
     own = first + 2 * np.arange(SQUARES.n_ligaments, dtype=float)
     intact = scene.objective.reference
@@ -205,7 +200,7 @@ def test_ligaments_of_a_list_may_have_stiffnesses_of_their_own(tmp_path: Path) -
 
 def test_hexagonal_is_another_name_of_the_honeycomb() -> None:
     sizes = {"columns": 3, "rows": 4, "spacing": "15 mm", "ligament_length": "2.25 mm"}
-    reader: TypeAdapter[object] = TypeAdapter(sections.Lattice)
+    reader: TypeAdapter[object] = TypeAdapter(problems.sections.Lattice)
     one, other = (
         reader.validate_python({"kind": kind, **sizes}) for kind in ("honeycomb", "hexagonal")
     )

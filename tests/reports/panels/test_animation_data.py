@@ -7,17 +7,9 @@ import numpy as np
 import pytest
 from matplotlib.colors import Normalize
 
+from reports import panels
 from reports.base import style
 from reports.figures.shielding.figure import shielding_animation
-from reports.panels import (
-    Animation,
-    AnimationAxis,
-    AnimationClip,
-    ColourField,
-    animation_data,
-    draw,
-    payload,
-)
 from reports.study import RigidUnits, StudyResults, rigid_units
 
 
@@ -25,7 +17,7 @@ def decoded(text: str, dtype: str) -> np.ndarray:
     return np.frombuffer(base64.b64decode(text), dtype)
 
 
-def clip(motion: np.ndarray) -> AnimationClip:
+def clip(motion: np.ndarray) -> panels.AnimationClip:
     n_units = motion.shape[2]
     corner = np.array([[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]])
     site = np.zeros((n_units, 2))
@@ -33,21 +25,23 @@ def clip(motion: np.ndarray) -> AnimationClip:
     flags = np.zeros(n_units, int)
     none = np.zeros((0, 2), int)
     structure = RigidUnits(site[:, None] + corner, site, none, none, flags, flags)
-    return AnimationClip("Static", "#000000", structure, motion)
+    return panels.AnimationClip("Static", "#000000", structure, motion)
 
 
 def static(motion: np.ndarray) -> dict[str, Any]:
-    axis = AnimationAxis("load", "mm", np.linspace(0, 5, motion.shape[1]), 2, False, {"slow": 1.0})
-    field = ColourField("uy", "u_y", "mm", 1.0, "signed", (-1.0, 1.0))
-    return payload(Animation(axis, ["compression"], [clip(motion)], [field]))
+    axis = panels.AnimationAxis(
+        "load", "mm", np.linspace(0, 5, motion.shape[1]), 2, False, {"slow": 1.0}
+    )
+    field = panels.ColourField("uy", "u_y", "mm", 1.0, "signed", (-1.0, 1.0))
+    return panels.payload(panels.Animation(axis, ["compression"], [clip(motion)], [field]))
 
 
 def test_motion_is_right_within_the_stated_error(study: StudyResults) -> None:
-    data = payload(shielding_animation(study))
-    shift, turn = animation_data.quantisation_error(data)
+    data = panels.payload(shielding_animation(study))
+    shift, turn = panels.animation_data.quantisation_error(data)
     assert shift < 1e-4
     assert turn < 1e-5
-    frames = animation_data.kept_frames(401, 2 * 4 * 225 * 3)
+    frames = panels.animation_data.kept_frames(401, 2 * 4 * 225 * 3)
     for s in range(2):
         for c in range(4):
             part = data["motion"][s][c]
@@ -59,7 +53,7 @@ def test_motion_is_right_within_the_stated_error(study: StudyResults) -> None:
 
 
 def test_axis_keeps_both_ends(study: StudyResults) -> None:
-    data = payload(shielding_animation(study))
+    data = panels.payload(shielding_animation(study))
     values = decoded(data["axis"]["values"], "<f4")
     assert values[0] == 0.0
     assert values[-1] == np.float32(2.0)
@@ -69,31 +63,33 @@ def test_axis_keeps_both_ends(study: StudyResults) -> None:
 @pytest.mark.parametrize("n_frames", [1, 2, 7, 200, 401, 1800])
 @pytest.mark.parametrize("n_values", [3, 5400, 60_000, 900_000])
 def test_kept_frames_fit_the_page(n_frames: int, n_values: int) -> None:
-    frames = animation_data.kept_frames(n_frames, n_values)
+    frames = panels.animation_data.kept_frames(n_frames, n_values)
     assert frames[0] == 0
     assert frames[-1] == n_frames - 1
-    assert len(frames) <= animation_data.MOST_STEPS + 1
-    assert len(frames) <= 3 or 2 * n_values * len(frames) <= animation_data.LARGEST_MOTION
+    assert len(frames) <= panels.animation_data.MOST_STEPS + 1
+    assert len(frames) <= 3 or 2 * n_values * len(frames) <= panels.animation_data.LARGEST_MOTION
 
 
 def test_lost_units_are_marked_as_such() -> None:
     motion = np.ones((1, 3, 4, 3))
     motion[0, 1, 2] = np.nan
     levels = decoded(static(motion)["motion"][0][0]["data"], "<i2").reshape(3, 4, 3)
-    assert (levels[1, 2] == animation_data.NO_DATA).all()
-    assert (np.delete(levels.reshape(12, 3), 6, axis=0) == animation_data.LARGEST_LEVEL).all()
+    assert (levels[1, 2] == panels.animation_data.NO_DATA).all()
+    assert (
+        np.delete(levels.reshape(12, 3), 6, axis=0) == panels.animation_data.LARGEST_LEVEL
+    ).all()
 
 
 def test_a_static_study_needs_no_time_and_no_motion_is_exact() -> None:
     data = static(np.zeros((1, 3, 4, 3)))
     assert data["motion"][0][0]["step"] == [0.0, 0.0, 0.0]
-    assert animation_data.quantisation_error(data) == (0.0, 0.0)
+    assert panels.animation_data.quantisation_error(data) == (0.0, 0.0)
     assert json.loads(json.dumps(data)) == data
     assert [data["axis"][key] for key in ("name", "unit", "loops")] == ["load", "mm", False]
 
 
 def test_polygons_are_whole(study: StudyResults) -> None:
-    shape = payload(shielding_animation(study))["structures"][1]
+    shape = panels.payload(shielding_animation(study))["structures"][1]
     centroid = decoded(shape["centroid"], "<f4").reshape(-1, 2)
     owner = decoded(shape["owner"], "<i4")
     corners = decoded(shape["arm"], "<f4").reshape(-1, 2) + centroid[owner]
@@ -135,7 +131,7 @@ def test_absent_units_are_not_drawn_and_values_follow(pair: RigidUnits) -> None:
     holed = dataclasses.replace(pair, vertices=vertices)
     axes = style.place(style.page(50.0), 5, 5, 40, 40)
     shades: dict[str, Any] = {"colour_map": style.MAGNITUDE, "norm": Normalize(0, 2)}
-    drawn = draw(axes, holed, values=np.array([1.0, 2.0]), **shades)
+    drawn = panels.draw(axes, holed, values=np.array([1.0, 2.0]), **shades)
     assert len(drawn.get_paths()) == 1
     values = drawn.get_array()
     assert values is not None

@@ -11,16 +11,7 @@ import sim
 from sim.optimise import Evaluation, InfeasibleStartError, Result, minimise, stationarity
 from sim.optimise.minimisation import Method
 from sim.optimise.quasi_newton import DAMPING, QuasiNewton
-from tests.sim.optimise.known_problems import (
-    Known,
-    cantilever,
-    corner,
-    in_disc,
-    many,
-    rosenbrock,
-    rosenbrock_in_disc,
-    shifted_bowl,
-)
+from tests.sim.optimise import known_problems as problems
 
 EXACT = sim.SqpOptions(evaluations=150, retreats=0, residual=1e-6, progress=1e-9)
 OPTIONS: dict[Method, Any] = {
@@ -28,15 +19,15 @@ OPTIONS: dict[Method, Any] = {
     "mma": sim.MmaOptions(evaluations=100, residual=1e-5),
 }
 KNOWN = {
-    "rosenbrock": (rosenbrock_in_disc(), {"sqp": 1e-5}),
-    "corner": (corner(), {"sqp": 1e-5, "mma": 1e-5}),
-    "bowl": (shifted_bowl(), {"sqp": 1e-6, "mma": 1e-4}),
-    "cantilever": (cantilever(), {"sqp": 1e-4, "mma": 5e-3}),
+    "rosenbrock": (problems.rosenbrock_in_disc(), {"sqp": 1e-5}),
+    "corner": (problems.corner(), {"sqp": 1e-5, "mma": 1e-5}),
+    "bowl": (problems.shifted_bowl(), {"sqp": 1e-6, "mma": 1e-4}),
+    "cantilever": (problems.cantilever(), {"sqp": 1e-4, "mma": 5e-3}),
 }
 """Problems, and how near each method comes to their optima."""
 
 
-def solved(known: Known, method: Method = "sqp", **changes: float) -> Result:
+def solved(known: problems.Known, method: Method = "sqp", **changes: float) -> Result:
     options = replace(OPTIONS[method], **changes)
     return minimise(method, known.loss, known.constraints, known.start, known.bounds, options)
 
@@ -51,7 +42,7 @@ def test_known_optima(name: str, method: Method) -> None:
 
 
 def test_unconstrained_rosenbrock() -> None:
-    found = minimise("sqp", rosenbrock, None, np.array([-1.2, 1.0]), options=EXACT)
+    found = minimise("sqp", problems.rosenbrock, None, np.array([-1.2, 1.0]), options=EXACT)
     np.testing.assert_allclose(found.x, [1, 1], atol=1e-3)
     assert len(found.evaluations) < 60
 
@@ -60,7 +51,7 @@ def test_unconstrained_rosenbrock() -> None:
     ("method", "size", "accuracy"), [("sqp", (100, 500), 1e-5), ("mma", (40, 120), 1e-4)]
 )
 def test_hundreds_of_constraints(method: Method, size: tuple[int, int], accuracy: float) -> None:
-    known = many(*size)
+    known = problems.many(*size)
     found = solved(known, method)
     np.testing.assert_allclose(found.x, known.optimum, atol=2e-2)
     assert found.loss == pytest.approx(known.loss(known.optimum)[0], rel=accuracy)
@@ -71,7 +62,7 @@ def test_hundreds_of_constraints(method: Method, size: tuple[int, int], accuracy
 def test_simulated_designs_are_feasible_and_seen_and_accepted_ones_improve(
     method: Method,
 ) -> None:
-    known, seen = corner(), list[Evaluation]()
+    known, seen = problems.corner(), list[Evaluation]()
     asked = (known.loss, known.constraints, known.start)
     found = minimise(method, *asked, options=OPTIONS[method], callback=seen.append)
     assert tuple(seen) == found.evaluations
@@ -81,7 +72,7 @@ def test_simulated_designs_are_feasible_and_seen_and_accepted_ones_improve(
 
 
 def test_losses_of_accepted_designs_decrease() -> None:
-    found = solved(rosenbrock_in_disc())
+    found = solved(problems.rosenbrock_in_disc())
     accepted = [e.loss for e in found.evaluations if e.accepted]
     assert (np.diff(accepted) < 0).all()
     assert found.loss == min(accepted) == found.evaluations[found.best].loss
@@ -89,14 +80,14 @@ def test_losses_of_accepted_designs_decrease() -> None:
 
 def test_steps_respect_the_radius_and_the_bounds() -> None:
     radius = 0.1
-    found = solved(shifted_bowl(), radius=radius, radius_max=radius)
+    found = solved(problems.shifted_bowl(), radius=radius, radius_max=radius)
     designs = np.array([e.x for e in found.evaluations])
     assert np.abs(np.diff(designs, axis=0)).max() <= radius + 1e-7
     assert np.abs(designs).max() <= 1.0
 
 
 def test_infeasible_start_is_moved_first() -> None:
-    known = corner()
+    known = problems.corner()
     found = minimise("sqp", known.loss, known.constraints, np.array([2.5, -1.0]), options=EXACT)
     assert found.evaluations[0].violation == 0.0
     np.testing.assert_allclose(found.x, known.optimum, atol=1e-5)
@@ -108,7 +99,7 @@ def test_contradictory_constraints_are_named(method: Method) -> None:
         return np.array([1.0, -1.0 - x @ x]), np.stack([0 * x, -2 * x])
 
     with pytest.raises(InfeasibleStartError, match="constraint 1") as caught:
-        minimise(method, rosenbrock, never, np.array([0.3, 0.2]))
+        minimise(method, problems.rosenbrock, never, np.array([0.3, 0.2]))
     assert caught.value.constraint == 1
     assert caught.value.violation >= 1.0
 
@@ -121,10 +112,10 @@ def test_failed_evaluations_are_rejected_and_teach_nothing() -> None:
         if len(poisoned) < 3 and x[1] > 0.6:
             poisoned.append(1)
             raise sim.SimulationError("step 3 did not converge at unit 12")
-        return rosenbrock(x)
+        return problems.rosenbrock(x)
 
-    found = minimise("sqp", fragile, in_disc, np.array([-1.0, 0.5]), options=EXACT)
-    np.testing.assert_allclose(found.x, rosenbrock_in_disc().optimum, atol=1e-4)
+    found = minimise("sqp", fragile, problems.in_disc, np.array([-1.0, 0.5]), options=EXACT)
+    np.testing.assert_allclose(found.x, problems.rosenbrock_in_disc().optimum, atol=1e-4)
     failed = [e for e in found.evaluations if e.failure is not None]
     assert len(failed) == 3
     assert all(np.isnan(e.loss) and not e.accepted for e in failed)
@@ -154,14 +145,16 @@ def test_the_model_stays_positive_definite(seed: int) -> None:
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_losses_that_are_not_finite_count_as_failures(method: Method, bad: float) -> None:
     def sometimes(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-        value, slope, aux = rosenbrock(x)
+        value, slope, aux = problems.rosenbrock(x)
         return (bad if x[0] > 0.5 else value), slope, aux
 
     options: Any = {
         "sqp": sim.SqpOptions(evaluations=40, retreats=0),
         "mma": sim.MmaOptions(evaluations=12),
     }
-    found = minimise(method, sometimes, in_disc, np.array([-1.0, 0.5]), options=options[method])
+    found = minimise(
+        method, sometimes, problems.in_disc, np.array([-1.0, 0.5]), options=options[method]
+    )
     assert np.isfinite(found.loss)
     assert found.x[0] <= 0.5
 
@@ -172,17 +165,19 @@ def test_a_start_that_fails_is_an_error(method: Method) -> None:
         raise sim.SimulationError("no equilibrium")
 
     with pytest.raises(sim.SimulationError, match="no equilibrium"):
-        minimise(method, broken, in_disc, np.array([-1.0, 0.5]))
+        minimise(method, broken, problems.in_disc, np.array([-1.0, 0.5]))
 
 
 @pytest.mark.parametrize("method", ["sqp", "mma"])
 def test_budget_and_target_stop_the_run(method: Method) -> None:
     make: Any = {"sqp": sim.SqpOptions, "mma": sim.MmaOptions}[method]
     start = np.array([-1.0, 0.5])
-    short = minimise(method, rosenbrock, in_disc, start, options=make(evaluations=5))
+    short = minimise(
+        method, problems.rosenbrock, problems.in_disc, start, options=make(evaluations=5)
+    )
     assert len(short.evaluations) == 5
     assert short.reason == "evaluations used up"
-    known = cantilever()
+    known = problems.cantilever()
     good = minimise(
         method, known.loss, known.constraints, known.start, known.bounds, make(target=1.4)
     )
@@ -210,7 +205,7 @@ def test_kicks_leave_a_poor_optimum_and_keep_the_best() -> None:
 @pytest.mark.parametrize("method", ["sqp", "mma"])
 def test_the_best_design_is_that_whose_confirmed_loss_is_the_best(method: Method) -> None:
     """Low losses are not found again: the lowest not at all, others with half as much again."""
-    known = corner()
+    known = problems.corner()
 
     def confirm(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         loss, gradient, aux = known.loss(x)
@@ -228,18 +223,18 @@ def test_the_best_design_is_that_whose_confirmed_loss_is_the_best(method: Method
 
 
 def test_runs_are_reproducible_bit_for_bit() -> None:
-    runs = [solved(many(40, 120), retreats=2, evaluations=60) for _ in range(2)]
+    runs = [solved(problems.many(40, 120), retreats=2, evaluations=60) for _ in range(2)]
     assert runs[0].x.tobytes() == runs[1].x.tobytes()
     assert [e.loss for e in runs[0].evaluations] == [e.loss for e in runs[1].evaluations]
 
 
 def test_options_of_another_method_are_refused() -> None:
     with pytest.raises(ValueError, match="MmaOptions are not options of the method 'sqp'"):
-        minimise("sqp", rosenbrock, None, np.zeros(2), options=sim.MmaOptions())
+        minimise("sqp", problems.rosenbrock, None, np.zeros(2), options=sim.MmaOptions())
 
 
 def test_multipliers_of_a_known_optimum() -> None:
-    known = corner()
+    known = problems.corner()
     _, gradient, _ = known.loss(known.optimum)
     assert known.constraints is not None
     values, jacobian = known.constraints(known.optimum)
@@ -270,7 +265,7 @@ def test_bounded_bowls_end_at_the_clipped_bottom(seed: int) -> None:
 
 def test_jumps_to_another_branch_teach_nothing() -> None:
     """Every third evaluation finds another equilibrium, with slopes that are not this one's."""
-    known, count = many(40, 120), [0]
+    known, count = problems.many(40, 120), [0]
 
     def jumping(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         loss, slope, aux = known.loss(x)

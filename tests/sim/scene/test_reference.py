@@ -13,18 +13,11 @@ from sim.core import Floats
 from sim.scene import Accuracy, DisplacementMimicking, StrainEnergyMimicking, parameters_of_design
 from sim.solvers import differentiable_motion, solve_case
 from sim.structure import shape
-from tests.sim.reference_scenes import (
-    SAMPLES,
-    compressed,
-    group_gradient,
-    paper_lattice,
-    reference,
-    scene_a,
-)
+from tests.sim import reference_scenes as scenes
 
 
 def test_lattice_is_the_references() -> None:
-    lattice, stored = paper_lattice(), reference("A")
+    lattice, stored = scenes.paper_lattice(), scenes.reference("A")
     made = shape(lattice, lattice.vertices)
     offset = stored["block_centroids_mm"][0]
     np.testing.assert_allclose(made.centroid, stored["block_centroids_mm"] - offset, atol=1e-10)
@@ -38,7 +31,7 @@ def test_lattice_is_the_references() -> None:
 
 
 def test_inertia_and_damping_are_the_references() -> None:
-    scene, stored = scene_a(), reference("A")
+    scene, stored = scenes.scene_a(), scenes.reference("A")
     values = sim.concrete_parameters(scene, scene.lattice.vertices)
     np.testing.assert_allclose(
         values.mass, stored["inertia_tonne_tonne_tonnemm2"], rtol=1e-11, atol=0
@@ -48,10 +41,10 @@ def test_inertia_and_damping_are_the_references() -> None:
 
 
 def test_regions_are_the_references() -> None:
-    stored = reference("A")
-    np.testing.assert_array_equal(scene_a().objective.region, stored["roi_blocks"])
+    stored = scenes.reference("A")
+    np.testing.assert_array_equal(scenes.scene_a().objective.region, stored["roi_blocks"])
     designed = sum(int(stored[f"mask_{kind}_design"].sum()) for kind in ("horizontal", "vertical"))
-    assert scene_a().space.n_variables == 2 * designed == 304
+    assert scenes.scene_a().space.n_variables == 2 * designed == 304
 
 
 class Outcome(NamedTuple):
@@ -62,10 +55,10 @@ class Outcome(NamedTuple):
 
 
 def outcome_of_scene_a(accuracy: Accuracy) -> Outcome:
-    scene = scene_a(accuracy=accuracy)
-    plan = sim.make_plan(scene, times=SAMPLES)
+    scene = scenes.scene_a(accuracy=accuracy)
+    plan = sim.make_plan(scene, times=scenes.SAMPLES)
     measure = DisplacementMimicking(
-        scene.objective.region, scene.lattice.spacing, np.ones(len(SAMPLES))
+        scene.objective.region, scene.lattice.spacing, np.ones(len(scenes.SAMPLES))
     )
     of_design = parameters_of_design(scene)
 
@@ -89,9 +82,9 @@ def relative(found: Floats, wanted: Floats) -> float:
 
 
 def assert_agrees_with_scene_a(found: Outcome, motion: float, loss: float, gradient: float) -> None:
-    stored, scale = reference("A"), np.array([15.0, 15.0, 1.0])
+    stored, scale = scenes.reference("A"), np.array([15.0, 15.0, 1.0])
     wanted = stored["roi_displacement_tight_mm_mm_rad"]
-    by_shifts = group_gradient(scene_a(), "A", "grad_{}_shifts_rk4_discrete")
+    by_shifts = scenes.group_gradient(scenes.scene_a(), "A", "grad_{}_shifts_rk4_discrete")
     assert relative(found.motion / scale, wanted / scale) <= motion
     assert abs(found.loss / stored["loss_tight"] - 1) <= loss
     assert relative(found.gradient, by_shifts) <= gradient
@@ -105,13 +98,13 @@ def test_scene_a_at_default_accuracy() -> None:
 
 def test_error_estimate_by_halving_the_steps() -> None:
     """Each step cut in two: what changes is the true error within a factor of 3."""
-    scene, stored = scene_a(), reference("A")
-    solver = sim.make_plan(scene, times=SAMPLES).solver
+    scene, stored = scenes.scene_a(), scenes.reference("A")
+    solver = sim.make_plan(scene, times=scenes.SAMPLES).solver
     values = sim.concrete_parameters(scene, scene.lattice.vertices)
     scale = np.array([15.0, 15.0, 1.0])
 
     def in_region(motion: Floats) -> Floats:
-        return motion.reshape(len(SAMPLES), -1, 3)[:, scene.objective.region] / scale
+        return motion.reshape(len(scenes.SAMPLES), -1, 3)[:, scene.objective.region] / scale
 
     coarse, _, record = solve_case(solver, values, scene.loads.cases[0])
     fine = solve_case(solver.refined(record), values, scene.loads.cases[0])[0]
@@ -123,7 +116,7 @@ def test_error_estimate_by_halving_the_steps() -> None:
 
 
 def static_measure(scene: sim.Scene, name: str, n_loads: int) -> StrainEnergyMimicking:
-    ligaments = np.flatnonzero(reference(name)["roi_bond_mask"])
+    ligaments = np.flatnonzero(scenes.reference(name)["roi_bond_mask"])
     return StrainEnergyMimicking(
         ligaments, scene.lattice.ligament_units[ligaments], np.ones(n_loads)
     )
@@ -131,7 +124,7 @@ def static_measure(scene: sim.Scene, name: str, n_loads: int) -> StrainEnergyMim
 
 @pytest.mark.parametrize("name", ["B", "C"])
 def test_final_equilibrium(name: str) -> None:
-    scene, stored = compressed(name), reference(name)
+    scene, stored = scenes.compressed(name), scenes.reference(name)
     end = np.array([scene.loads.duration])
     plan = sim.make_plan(scene, times=end)
     measure, of_design = static_measure(scene, name, 1), parameters_of_design(scene)
@@ -145,12 +138,12 @@ def test_final_equilibrium(name: str) -> None:
     (energy, motion), gradient = jax.value_and_grad(loss, has_aux=True)(design)
     np.testing.assert_allclose(motion[0, 0], stored["static_u_eq_final"], rtol=0, atol=1e-7)
     np.testing.assert_allclose(energy, stored["static_final_loss_Nmm"], rtol=1e-9)
-    wanted = group_gradient(scene, name, "static_final_grad_{}_shifts")
+    wanted = scenes.group_gradient(scene, name, "static_final_grad_{}_shifts")
     assert relative(np.asarray(gradient), wanted) <= 1e-7
 
 
 def test_path_of_scene_b() -> None:
-    scene, stored = compressed("B"), reference("B")
+    scene, stored = scenes.compressed("B"), scenes.reference("B")
     amplitudes = stored["static_path_amps_mm"]
     plan = sim.make_plan(scene, times=amplitudes)
     values = sim.concrete_parameters(scene, scene.lattice.vertices)

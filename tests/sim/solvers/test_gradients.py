@@ -35,16 +35,7 @@ from sim.time_integration import (
 )
 from sim.time_integration.esdirk import march
 from sim.time_integration.esdirk_stage import solve_stage
-from tests.sim.structures import (
-    CORNERS,
-    Numbers,
-    Rig,
-    mixed_polygons,
-    rotating_squares,
-    shaken,
-    squeezed,
-    uneven_loss,
-)
+from tests.sim import structures
 
 TAYLOR = {
     "design": np.geomspace(1e-3, 1e-4, 4),
@@ -67,7 +58,7 @@ DURATION = 0.012
 ASKED = np.linspace(0.0, DURATION, 9)
 EVERYWHERE = np.linspace(0.0, DURATION, 301)
 
-Method = Callable[[Rig], Solver]
+Method = Callable[[structures.Rig], Solver]
 SOLVERS: dict[str, Method] = {
     "static": lambda rig: StaticSolver(rig.topology, np.array([0.4, 1.0]), relative=1e-13),
     "implicit": lambda rig: ImplicitSolver(
@@ -85,13 +76,13 @@ QUANTITIES = ("design", "stiffness", "density", "damping", "drive")
 
 
 @cache
-def recorded() -> Rig:
+def recorded() -> structures.Rig:
     """The middle of the shaken squares, along a recorded wave."""
-    return replace(shaken(), motion=measured())
+    return replace(structures.shaken(), motion=measured())
 
 
 @cache
-def pushed(slowly: bool) -> Rig:
+def pushed(slowly: bool) -> structures.Rig:
     """Squares clamped at corners, a force on one unit, which may not turn, and one on another."""
     course = (
         sim.LinearRamp(0.4, 1.0, 2.0) if slowly else sim.Harmonic(0.4, 150.0, 2.0, 0.0015, 0.003)
@@ -99,14 +90,16 @@ def pushed(slowly: bool) -> Rig:
     shares = np.array([[1.0], [-0.3]])
     control = np.array([[FORCE, FORCE, DISPLACEMENT], [FORCE] * 3])
     forces, driven = Together((course,), shares), np.array([12, 18])
-    return Rig(rotating_squares(), CORNERS, driven, forces, control=control)
+    return structures.Rig(
+        structures.rotating_squares(), structures.CORNERS, driven, forces, control=control
+    )
 
 
 @cache
-def pulled() -> Rig:
+def pulled() -> structures.Rig:
     """Polygons of all kinds, two of them pulled, each along a recorded path of its own."""
     driven = np.array([4, 7])
-    return Rig(mixed_polygons(), np.array([0]), driven, measured(len(driven)))
+    return structures.Rig(structures.mixed_polygons(), np.array([0]), driven, measured(len(driven)))
 
 
 def measured(n_units: int | None = None) -> sim.TimeSeries:
@@ -119,12 +112,12 @@ def measured(n_units: int | None = None) -> sim.TimeSeries:
 
 
 @cache
-def solver_of(rig: Rig, method: Method) -> Solver:
+def solver_of(rig: structures.Rig, method: Method) -> Solver:
     return method(rig)
 
 
 @cache
-def gradient(rig: Rig, method: Method) -> Floats:
+def gradient(rig: structures.Rig, method: Method) -> Floats:
     """Derivatives of the loss by all numbers, one after the other."""
     found = jax.grad(partial(rig.loss, solver_of(rig, method)))(rig.numbers)
     return np.asarray(ravel_pytree(found)[0])
@@ -134,7 +127,7 @@ def gradient(rig: Rig, method: Method) -> Floats:
 class Ray:
     """Loss of a solver along one direction, and its slope by the adjoint."""
 
-    rig: Rig
+    rig: structures.Rig
     method: Method
     quantity: str
 
@@ -143,7 +136,7 @@ class Ray:
         return solver_of(self.rig, self.method)
 
     @cached_property
-    def direction(self) -> Numbers:
+    def direction(self) -> structures.Numbers:
         """A random change of one quantity alone."""
         rng = np.random.default_rng(7)
         recorded = isinstance(self.rig.motion, sim.TimeSeries)
@@ -158,7 +151,7 @@ class Ray:
         still = jax.tree.map(jnp.zeros_like, self.rig.numbers)
         return still._replace(**{self.quantity: changed})
 
-    def at(self, step: float) -> Numbers:
+    def at(self, step: float) -> structures.Numbers:
         return jax.tree.map(lambda x, d: x + step * d, self.rig.numbers, self.direction)
 
     def motion(self, step: float, solver: Solver) -> tuple[Floats, Floats]:
@@ -168,7 +161,7 @@ class Ray:
         return solve_cases(solver, concrete(self.rig.parameters(numbers)), (drive,))[:2]
 
     def loss(self, step: float) -> float:
-        return float(uneven_loss(*self.motion(step, self.solver)))
+        return float(structures.uneven_loss(*self.motion(step, self.solver)))
 
     @property
     def slope(self) -> float:
@@ -204,19 +197,19 @@ def assert_exact_in_contact(ray: Ray) -> None:
     assert ray.order_of_remainder(TAYLOR_IN_CONTACT[ray.quantity]) == pytest.approx(2.0, abs=0.05)
 
 
-Posed = Callable[[], Rig]
+Posed = Callable[[], structures.Rig]
 Rows = list[tuple[Posed, tuple[str, ...], tuple[str, ...]]]
 SMOOTH: Rows = [
-    (partial(squeezed, 4.0), ("static",), ("design", "stiffness", "drive")),
+    (partial(structures.squeezed, 4.0), ("static",), ("design", "stiffness", "drive")),
     (partial(pushed, slowly=True), ("static",), ("design", "stiffness", "drive")),
     (partial(pushed, slowly=False), LOOPS, QUANTITIES),
-    (shaken, DYNAMIC, ("design", "damping", "drive")),
+    (structures.shaken, DYNAMIC, ("design", "damping", "drive")),
     (recorded, DYNAMIC, ("drive",)),
     (pulled, LOOPS, ("design", "drive")),
 ]
 TOUCHING: Rows = [
-    (partial(squeezed, 9.0), ("static",), ("design", "stiffness", "contact", "drive")),
-    (partial(shaken, bias_deg=45.0), LOOPS, (*QUANTITIES, "contact")),
+    (partial(structures.squeezed, 9.0), ("static",), ("design", "stiffness", "contact", "drive")),
+    (partial(structures.shaken, bias_deg=45.0), LOOPS, (*QUANTITIES, "contact")),
 ]
 
 
@@ -232,14 +225,14 @@ def test_gradients_without_contact(posed: Posed, solver: str, quantity: str) -> 
 
 def test_equilibria_by_fronts() -> None:
     """30 x 30 squares, whose tangent is no longer stored as a band."""
-    rig = squeezed(20.0, side=30)
+    rig = structures.squeezed(20.0, side=30)
     assert rig.topology.numbering[1].by_fronts
     assert_exact(Ray(rig, SOLVERS["static"], "design"))
 
 
 @pytest.mark.parametrize("quantity", ["density", "damping"])
 def test_equilibria_do_not_depend_on_inertia(quantity: str) -> None:
-    rig = squeezed(4.0)
+    rig = structures.squeezed(4.0)
     assert Ray(rig, SOLVERS["static"], quantity).slope == 0.0
 
 
@@ -257,7 +250,7 @@ def test_gradients_in_contact(posed: Posed, solver: str, quantity: str) -> None:
 @pytest.mark.parametrize("quantity", ["design", "contact", "drive"])
 def test_motions_deep_in_contact(quantity: str) -> None:
     """Voids that close to their barrier, followed by many finer steps."""
-    rig = shaken(bias_deg=45.0, amplitude=3.0)
+    rig = structures.shaken(bias_deg=45.0, amplitude=3.0)
     ray = Ray(rig, SOLVERS["blanes_moan"], quantity)
     states = ray.motion(0.0, ray.solver)[0][0]
     assert rig.topology.smallest_void_angle(rig.values.void, states).min() < np.deg2rad(-13.5)
@@ -267,7 +260,7 @@ def test_motions_deep_in_contact(quantity: str) -> None:
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_loops_are_compiled_for_one_kind_of_arguments(solver: str) -> None:
     """Derivatives come as arrays of JAX, which are read only, or of NumPy."""
-    rig = shaken() if solver in DYNAMIC else squeezed(4.0)
+    rig = structures.shaken() if solver in DYNAMIC else structures.squeezed(4.0)
     method = solver_of(rig, SOLVERS[solver])
     by_jax = Ray(rig, SOLVERS[solver], "design").slope
     motion, velocity, records = solve_cases(method, rig.values, (rig.drive,))
