@@ -30,12 +30,9 @@ def test_our_equilibria_and_gradients(way: int, reference: Found) -> None:
     assert max(found.values()) < 1e-9
 
 
-def test_differences_come_to_the_gradient(reference: Found) -> None:
+def test_differences_and_scipy_come_to_the_reference(reference: Found) -> None:
     found = missed(own_solvers.differences("small_push"), 1e-4, "gradient", reference)
     assert found["gradient"] < 1e-7
-
-
-def test_newton_by_scipy_comes_to_the_reference(reference: Found) -> None:
     splu = scipy_statics.at_rest("small_push", (1e-4,))[0]
     assert 0 < missed(splu, 1e-4, "loss", reference)["displacement"] < 1e-4
 

@@ -80,14 +80,11 @@ def test_the_baseline_has_the_same_forces() -> None:
     np.testing.assert_allclose(np.ravel(theirs), ours, atol=1e-12 * np.abs(ours).max())
 
 
-def test_the_tables_are_read_whole() -> None:
+def test_the_picture_shows_the_tables_whole() -> None:
     found = tables(PAGE.read_text(encoding="utf-8"))
     wanted = {"fig2": 4, "fig4": 3, "precision": 7, "warm": 2, "static": 6}
     assert {name: len(rows) for name, rows in found.items()} == wanted
     assert found["fig2"][0] == TableRow("ours", 0.443, 3.9e-05)
-
-
-def test_the_picture_shows_them() -> None:
     found = tables(PAGE.read_text(encoding="utf-8"))
     with style.styled():
         left, right = figure(found).axes

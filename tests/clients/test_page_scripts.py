@@ -58,14 +58,11 @@ def test_it_plays_to_the_last_load_and_stops(browser: Chrome) -> None:
     assert at(browser) < 5.0
 
 
-def test_there_is_no_menu_for_a_single_case(browser: Chrome) -> None:
-    assert not browser.find_elements(By.ID, "player-case")
-    assert browser.find_element(By.CSS_SELECTOR, "#player output").text == "load = 0.0 mm"
-
-
-def test_the_slider_runs_over_uneven_loads(browser: Chrome) -> None:
+def test_the_slider_runs_over_uneven_loads_of_a_single_case(browser: Chrome) -> None:
     scrub(browser, 0.5)
     assert at(browser) == pytest.approx(2.5)
+    assert not browser.find_elements(By.ID, "player-case")
+    assert browser.find_element(By.CSS_SELECTOR, "#player output").text == "load = 0.0 mm"
 
 
 def test_a_lost_unit_stays_blank(browser: Chrome) -> None:

@@ -109,14 +109,11 @@ def test_all_else_is_run_on_a_page_that_is_walked_through() -> None:
             assert command.page in WALKED, command
 
 
-def test_a_command_in_a_sentence_is_there() -> None:
+def test_commands_and_files_in_a_sentence_are_there() -> None:
     for command in set(inline(r"python -m ([\w.]+(?: \w+)?)")):
         module, _, stage = command.partition(" ")
         path = ROOT.joinpath(*module.split("."))
         assert path.with_suffix(".py").is_file() or (path / "__main__.py").is_file()
         assert module != "pipeline" or not stage or stage in STAGES
-
-
-def test_files_in_a_sentence_are_there() -> None:
     for name in set(inline(r"((?:sim|pipeline|reports|tests|experiments|docs)/[a-z_/.]+)")):
         assert (ROOT / name).exists() or "logo" in name, name

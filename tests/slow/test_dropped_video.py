@@ -96,9 +96,6 @@ def test_it_is_compared_with_the_simulation(compared: xr.Dataset) -> None:
     assert float(compared["drive_correlation"]) > 0.9
     assert compared["simulated"].notnull().all()
     assert int(compared["band_samples"]) == 4
-
-
-def test_what_was_measured_is_what_the_video_shows(compared: xr.Dataset) -> None:
     truth = np.load(CLIP.with_name("b_harmonic_truth.npz"))["displacement"]
     off = np.sqrt(np.mean((compared["measured"].values - truth) ** 2, axis=(0, 1)))
     assert (off < [0.01, 0.01, 0.003]).all()

@@ -25,24 +25,16 @@ def test_studies_from_nothing(sandbox: Sandbox) -> None:
     packages = {"fabricate": 2, "fabrication_page": 1, "fig2_fabrication": 1}
     assert sandbox.planned("fig2_fabrication") == {"design": 2, "select": 1, **packages}
     assert sandbox.planned("benchmark") == {"measure": 12, "benchmark": 1}
-
-
-def test_a_figure_of_several_studies(sandbox: Sandbox) -> None:
     planned = sandbox.planned("fig6@quick")
     assert planned["joint_report"] == 1
     assert planned["simulate"] == 2
     assert not {"redesign", "report"} & planned.keys()
-
-
-def test_a_design_by_the_angle_law_is_made_again(sandbox: Sandbox) -> None:
-    problem = sandbox.root / "experiments/fig5/problem.yaml"
-    problem.write_text(problem.read_text().replace("law: geometric", "law: angle"))
-    planned = sandbox.planned("fig5@quick")
-    assert planned["simulate"] == 2  # by the angle law, then with contact on distance
-    assert planned["redesign"] == 1
-
-
-def test_every_figure_of_the_paper_and_its_index(sandbox: Sandbox) -> None:
+    planned = sandbox.planned("fig3@quick")
+    assert planned["design"] == planned["simulate"] == 2
+    assert planned["family_report"] == 1
+    assert "report" not in planned
+    alone = sandbox.planned("fig3@quick.2")
+    assert alone["design"] == alone["report"] == 1
     planned = sandbox.planned("all")
     assert planned["all"] == 1
     assert planned["joint_report"] == 1
@@ -53,13 +45,12 @@ def test_every_figure_of_the_paper_and_its_index(sandbox: Sandbox) -> None:
     assert sandbox.planned("index") == {"index": 1}
 
 
-def test_a_job_for_each_of_several_designs(sandbox: Sandbox) -> None:
-    planned = sandbox.planned("fig3@quick")
-    assert planned["design"] == planned["simulate"] == 2
-    assert planned["family_report"] == 1
-    assert "report" not in planned
-    alone = sandbox.planned("fig3@quick.2")
-    assert alone["design"] == alone["report"] == 1
+def test_a_design_by_the_angle_law_is_made_again(sandbox: Sandbox) -> None:
+    problem = sandbox.root / "experiments/fig5/problem.yaml"
+    problem.write_text(problem.read_text().replace("law: geometric", "law: angle"))
+    planned = sandbox.planned("fig5@quick")
+    assert planned["simulate"] == 2  # by the angle law, then with contact on distance
+    assert planned["redesign"] == 1
 
 
 def test_datasets_are_those_that_the_problem_asks_for(sandbox: Sandbox) -> None:

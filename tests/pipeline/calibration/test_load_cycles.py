@@ -40,9 +40,6 @@ def test_branches_and_loops_of_a_record() -> None:
     assert [each.loading for each in branches] == [True, False] * 3
     np.testing.assert_allclose(branches[2].work, 6.0, rtol=0.02)
     np.testing.assert_allclose(load_cycles.loop_areas(branches)[2::2], 2.0, rtol=0.05)
-
-
-def test_small_turns_of_a_noisy_displacement_end_no_branch() -> None:
     way, force = cycles(2)
     shaken = way + np.random.default_rng(0).normal(0, 0.02, len(way))
     assert len(load_cycles.split_branches(shaken, force)) == 4
@@ -220,16 +217,13 @@ def test_play_opens_a_gap_without_force(morpher: LoadCycles) -> None:
     assert (np.sign(moved.approach - found.approach) == -np.sign(found.tension)).all()
 
 
-def test_a_path_that_goes_back_is_refused(morpher: LoadCycles, tmp_path: Path) -> None:
-    lines = ["ux (mm),uy (mm),approach (mm)", "0,0,0", "1,0,1", "2,0,0.5", "3,0,2"]
-    (tmp_path / "arc.csv").write_text("\n".join(lines))
+def test_paths_back_and_lone_branches_are_refused(morpher: LoadCycles, tmp_path: Path) -> None:
+    path = ["ux (mm),uy (mm),approach (mm)", "0,0,0", "1,0,1", "2,0,0.5", "3,0,2"]
+    (tmp_path / "arc.csv").write_text("\n".join(path))
     drive = morpher.drive.model_copy(update={"file": "arc.csv"})
     wrong = morpher.model_copy(update={"drive": drive})
     with refused("the approach does not rise", "approach"):
         follow_cycle(wrong, morpher.records[0], tmp_path)
-
-
-def test_a_record_without_a_cycle_is_refused(morpher: LoadCycles, tmp_path: Path) -> None:
     lines = "\n".join(f"{k},{k}" for k in range(1, 30))
     (tmp_path / "one.csv").write_text(f"approach (mm),tension (N)\n{lines}\n")
     single = morpher.records[2].model_copy(update={"file": "one.csv"})

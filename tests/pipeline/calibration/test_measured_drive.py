@@ -77,12 +77,7 @@ def test_changes_have_the_covariance_of_the_noise(scene: Scene) -> None:
     assert abs(np.mean(errors)) < 3 * np.sqrt(np.mean(told) / 120)
 
 
-def test_frames_that_are_too_few_are_told(scene: Scene) -> None:
-    sparse = tracked(np.random.default_rng(3)).isel(time=slice(None, None, 5))
-    assert smooth_drive(sparse, scene, BIAS).coarse
-
-
-def test_frames_without_a_unit_are_bridged(scene: Scene) -> None:
+def test_frames_without_a_unit_are_bridged_too_few_are_told(scene: Scene) -> None:
     track = tracked(np.random.default_rng(4))
     track["displacement"][20:26, 0] = np.nan
     found = smooth_drive(track, scene, BIAS)
@@ -91,3 +86,5 @@ def test_frames_without_a_unit_are_bridged(scene: Scene) -> None:
     error = np.sqrt(np.sum(spread, axis=0))
     assert (np.abs(along_x(found)[:, 0] - course(knots)) < 5 * error + 1e-12).all()
     assert error.max() > 2 * np.median(error)
+    sparse = tracked(np.random.default_rng(3)).isel(time=slice(None, None, 5))
+    assert smooth_drive(sparse, scene, BIAS).coarse

@@ -60,13 +60,10 @@ def test_the_stated_uncertainty_of_the_lag_is_that_of_the_result(alike: float) -
     assert found[0].sigma < 0.05 / RATE
 
 
-def test_frames_without_the_drive_are_left_out() -> None:
+def test_gaps_and_a_gain_are_not_taken_for_a_lag() -> None:
     course = filmed(0.1)
     course.value[20:40] = np.nan
     assert find_lag(course, NOMINAL).value == pytest.approx(0.1, abs=0.01 / RATE)
-
-
-def test_a_gain_is_told_and_not_taken_for_a_lag() -> None:
     course = filmed(0.1)
     found = find_lag(SampledMotion(course.time, 1.3 * course.value), NOMINAL)
     assert found.gain == pytest.approx(1.3, abs=2e-3)
@@ -82,14 +79,11 @@ def test_a_steady_vibration_is_said_to_be_ambiguous() -> None:
     assert not find_lag(filmed(0.2), NOMINAL).ambiguous
 
 
-def test_a_drive_of_another_frequency_cannot_be_aligned() -> None:
+def test_other_frequencies_and_too_few_frames_are_refused() -> None:
     time = np.arange(90) / RATE
     other = SampledMotion(time, sine(2.7 * time))
     with pytest.raises(UserError, match=r"cannot be aligned[\s\S]*correlation"):
         find_lag(other, NOMINAL)
-
-
-def test_too_few_frames_are_refused() -> None:
     with pytest.raises(UserError, match="too few frames"):
         find_lag(filmed(0.0, frames=7), NOMINAL)
     with pytest.raises(UserError, match="too few frames"):
@@ -105,15 +99,12 @@ def test_equal_displacement_is_equal_load_on_both_branches() -> None:
     np.testing.assert_array_equal(find_branches(there)[[60, 75]], UNLOADING)
 
 
-def test_loads_beyond_the_nominal_ones_have_no_time() -> None:
+def test_loads_beyond_have_no_time_others_are_refused() -> None:
     ramp = SampledMotion(TIMES, 10 * TIMES[:, None])
     found = find_load_time(np.linspace(-0.01, 25.0, 26), ramp)
     assert found[0] == 0.0
     assert np.isfinite(found[:20]).all()
     assert np.isnan(found[22:]).all()
-
-
-def test_a_drive_that_does_not_move_along_is_refused() -> None:
     ramp = SampledMotion(TIMES, 10 * TIMES[:, None])
     with pytest.raises(UserError, match="cannot be aligned"):
         find_load_time(np.linspace(0.0, -15.0, 30), ramp)
@@ -182,13 +173,10 @@ def test_few_units_leave_fewer_degrees_of_freedom() -> None:
     assert np.mean(variance) == pytest.approx(0.05**2, rel=0.1)
 
 
-def test_the_scale_is_not_taken_out_of_motions() -> None:
+def test_the_scale_stays_and_unseen_units_do_not_count() -> None:
     found = register(GRID, moved(np.pi / 2, 1.1, (3.0, 0.0)))
     upright = found.upright(np.array([0.0, 2.0, 0.3]))
     np.testing.assert_allclose(upright, [2.0, 0.0, 0.3], atol=1e-12)
-
-
-def test_units_that_were_not_seen_do_not_count() -> None:
     seen = moved(0.1, 1.0, (0.0, 0.0))
     seen[3:9] = np.nan
     assert register(GRID, seen).rotation == pytest.approx(0.1, abs=1e-9)

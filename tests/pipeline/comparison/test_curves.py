@@ -26,15 +26,12 @@ def sides(measured: np.ndarray, noise: float = NOISE, gain: float = 1.0) -> curv
     return curves.Sides(seen, sigma, gain * WAVES, gain * WAVES, copies, 0.95)
 
 
-def test_a_peak_between_frames_is_not_missed() -> None:
+def test_peaks_between_frames_are_not_missed_of_units_often_seen() -> None:
     off = np.linspace(-0.5, 0.5, 33).reshape(11, 3)
     hill = 1 - 0.05 * (np.arange(-4, 5)[:, None, None] - off) ** 2
     np.testing.assert_allclose(curves.peak_to_peak(hill), 1 - hill.min(axis=0), atol=1e-12)
     np.testing.assert_allclose(curves.peak_to_peak(-hill), 1 - hill.min(axis=0), atol=1e-12)
     np.testing.assert_allclose(curves.peak_to_peak(WAVES), 2.0, atol=0.02)
-
-
-def test_units_that_are_seldom_seen_have_no_peaks() -> None:
     seen = WAVES.copy()
     seen[:9, 0], seen[20, 1] = np.nan, np.nan
     found = curves.peak_to_peak(seen)

@@ -76,14 +76,11 @@ def test_both_branches_lie_on_the_load_axis(whole: xr.Dataset) -> None:
     )
 
 
-def test_units_that_are_held_or_absent_are_not_compared(whole: xr.Dataset) -> None:
+def test_free_units_are_compared_and_within_the_band(whole: xr.Dataset) -> None:
     counts = np.bincount(whole["use"].values, minlength=5).tolist()
     assert counts == [14, 5, 5, 1, 0]
     apart = whole["rmse_map"].sel(side="simulated").isnull().any("dof").values
     np.testing.assert_array_equal(apart, whole["use"].values != 0)
-
-
-def test_the_band_holds_the_noisy_measurement(whole: xr.Dataset) -> None:
     assert int(whole["band_samples"]) == 64
     assert (whole["band_coverage"] > 0.95).all()
     assert (whole["band_low"].isel(time=-1) <= whole["band_high"].isel(time=-1)).sum() > 14

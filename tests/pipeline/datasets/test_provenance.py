@@ -28,9 +28,6 @@ def test_attributes_tell_where_a_dataset_comes_from(fig2: Path) -> None:
     turned = {"a": [2], "b": 1}, {"b": 1, "a": [2]}
     plans = [provenance.of_study(problem, "simulate", plan=plan)["plan"] for plan in turned]
     assert plans[0] == plans[1]
-
-
-def test_a_method_stores_its_own_part(fig2: Path) -> None:
     told = provenance.of_study(load(fig2), "design", method="mma")
     assert list(from_canonical(told["problem"]).optimiser.methods.chosen) == ["mma"]
 

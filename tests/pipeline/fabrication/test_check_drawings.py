@@ -116,12 +116,6 @@ def test_a_damaged_drawing_is_caught(tmp_path: Path, name: str, suffix: str) -> 
     assert any(expected in words for words in told), told
 
 
-def test_text_in_an_svg_is_caught(tmp_path: Path) -> None:
-    path = write_svg(tmp_path / "sheet.svg", sheet(), SIZE)
-    path.write_text(path.read_text().replace("</svg>", '<text x="3" y="9">A1</text></svg>'))
-    assert any("a TEXT on layer" in words for words in found(read_drawing(path)))
-
-
 def test_a_unit_without_its_own_id_is_caught(tmp_path: Path) -> None:
     bare = [curve for curve in sheet() if curve.layer != "ENGRAVE"]
     told = [f"part {name}: no id is engraved on it" for name in ("A1", "B1")]
@@ -132,11 +126,14 @@ def test_a_unit_without_its_own_id_is_caught(tmp_path: Path) -> None:
     assert found(drawn(tmp_path / "units_2.dxf", other)) == told
 
 
-def test_wrong_units_and_two_layers_of_one_colour_are_caught(tmp_path: Path) -> None:
+def test_wrong_units_one_colour_twice_and_text_are_caught(tmp_path: Path) -> None:
     drawing = read_drawing(write_dxf(tmp_path / "sheet.dxf", sheet(), units=1))
     assert found(drawing) == ["the drawing: $INSUNITS is 1, not 4 (millimetres)"]
     path = write_dxf(tmp_path / "sheet.dxf", sheet(), colours={"CUT_INNER": 1})
     assert "layers CUT_INNER and CUT_OUTER have one colour" in found(read_drawing(path))[0]
+    path = write_svg(tmp_path / "sheet.svg", sheet(), SIZE)
+    path.write_text(path.read_text().replace("</svg>", '<text x="3" y="9">A1</text></svg>'))
+    assert any("a TEXT on layer" in words for words in found(read_drawing(path)))
 
 
 @pytest.mark.parametrize(

@@ -27,15 +27,12 @@ def test_id_lies_inside_even_a_band_narrower_than_a_letter_is_high(outline: Poly
     assert max(np.ptp(strokes.bounds[::2]), np.ptp(strokes.bounds[1::2])) >= 2.0
 
 
-def test_underside_is_the_mirror_image_of_the_top() -> None:
+def test_underside_is_the_mirror_image_and_the_arrow_points_up() -> None:
     placed = place_id("F7", WIDE, WIDE, Labels())
     assert placed is not None
     for top, below in zip(placed.strokes, placed.mirrored, strict=True):
         assert below[:, 1] == pytest.approx(top[:, 1])
         assert below[:, 0] == pytest.approx(20.0 - top[:, 0])
-
-
-def test_arrow_points_up_and_keeps_off_the_id() -> None:
     placed = place_id("F7", WIDE, WIDE, Labels())
     assert placed is not None
     stem, shaft = orientation_mark(WIDE, WIDE, placed.box, Labels())

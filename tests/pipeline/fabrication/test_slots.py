@@ -136,16 +136,13 @@ def test_too_slender_a_corner_is_named_with_the_wall_that_it_could_have() -> Non
     assert caught.value.wall == pytest.approx((1.0 - 0.45) / 2, abs=0.05)
 
 
-def test_unit_grows_no_nearer_to_its_neighbours_than_the_gap() -> None:
+def test_units_grow_as_far_as_the_gap_and_fillets_round_corners() -> None:
     sliver = Polygon([(0.0, 0.0), (30.0, 0.0), (30.0, 1.4), (0.0, 1.4)])
     neighbour = shapely.box(0.0, 1.7, 30.0, 5.0)
     room = room_to_grow(sliver, [neighbour], 1.0, ASKED)
     assert room.covers(sliver)
     assert room.distance(neighbour) >= ASKED.minimum_gap
     assert room.bounds[1] == pytest.approx(-1.0)
-
-
-def test_fillets_round_convex_corners_only() -> None:
     rounded = filleted(square(10.0), 1.0)
     assert rounded.area == pytest.approx(100.0 - (4.0 - np.pi), rel=1e-3)
     assert filleted(square(10.0), 0.0).equals(square(10.0))

@@ -95,16 +95,13 @@ def test_what_a_void_cuts_loose_can_go_too(tmp_path: Path) -> None:
     assert void_units(loose) == void_units(whole)
 
 
-def test_an_image_is_upright_and_keeps_its_proportions(placed: Placed, tmp_path: Path) -> None:
+def test_an_image_keeps_its_proportions_and_turns(placed: Placed, tmp_path: Path) -> None:
     (shape,) = placed(f"image: {{ file: {draw(tmp_path / 'l.png').name}, width: 80 mm }}")
     assert extents(shape) == pytest.approx((80.0, 80 * 59 / 39), rel=0.02)
     points = np.array(shape)
     foot = points[points[:, 1] < MIDDLE[1] - 40]
     assert np.ptp(foot[:, 0]) == pytest.approx(80.0)
     assert np.ptp(points[points[:, 1] > MIDDLE[1] + 20][:, 0]) < 35
-
-
-def test_an_image_turns_counter_clockwise(placed: Placed, tmp_path: Path) -> None:
     given = f"file: {draw(tmp_path / 'l.png').name}, width: 80 mm, centre: [200 mm, 210 mm]"
     upright = placed(f"image: {{ {given} }}")
     turned = placed(f"image: {{ {given}, orientation: 90 deg }}")

@@ -25,12 +25,9 @@ def test_names_mean_sides(selector: NamedUnits, units: list[int]) -> None:
     assert list(selected_units(selector, lattice(3, 5))) == units
 
 
-def test_listed_units_are_sorted_and_unique() -> None:
+def test_listed_units_are_sorted_and_corners_unique() -> None:
     listed = ListedUnits(units=((2, 1), (0, 0), (2, 1)))
     assert selected_units(listed, lattice(3, 5)) == (0, 5)
-
-
-def test_a_single_row_has_two_corners() -> None:
     assert selected_units("corners", lattice(4, 1)) == (0, 3)
     assert selected_units("corners", lattice(1, 1)) == (0,)
 

@@ -68,15 +68,12 @@ def test_both_holds_only_where_both_hold_and_what_is_missing_is_told() -> None:
     assert found(ROTATION, off)["rotation_altered"].both == "does not hold"
 
 
-def test_multiples_of_the_spacing_are_lengths() -> None:
+def test_multiples_of_the_spacing_are_lengths_other_units_refused() -> None:
     radius = number("interest_radius", "radius", 52.0, "mm")
     spacing = number("spacing", "spacing", 15.0, "mm")
     assert found(radius, spacing)["interest_radius"].simulation.status == "holds"
     off = replace(radius, value=67.5)
     assert found(off, spacing)["interest_radius"].simulation.status == "does not hold"
-
-
-def test_a_fact_in_another_unit_is_refused() -> None:
     with pytest.raises(UserError, match="rotation_altered"):
         found(replace(ROTATION, unit="rad"))
 

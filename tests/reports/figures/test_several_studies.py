@@ -41,15 +41,12 @@ def test_it_is_legible_with_any_number_of_studies(pair: list[StudyResults], coun
     assert set("abcdefghijkl"[: -(-count // 2) + 3 * count]) <= words
 
 
-def test_facts_and_tables_tell_their_study(report: Path) -> None:
+def test_the_page_tells_each_study_and_shows_each_structure_once(report: Path) -> None:
     found = {fact["key"]: fact for fact in json.loads((report / "facts.json").read_text())}
     assert found["fig_smile.mismatch_reduction"]["group"] == "Smile: Result"
     assert found["fig_frown.mismatch_reduction"]["group"] == "Frown: Result"
     with (report / "fig_frown_path.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 9
-
-
-def test_the_page_shows_every_structure_once(report: Path) -> None:
     html = (report / "index.html").read_text(encoding="utf-8")
     data = html.partition('id="player-data">')[2].partition("</script>")[0]
     names = [part["name"] for part in json.loads(data.replace("<\\/", "</"))["structures"]]

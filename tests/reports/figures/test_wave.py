@@ -39,12 +39,9 @@ def test_voids_close_by_the_turn_of_one_unit_against_the_other(smile: StudyResul
     assert closed_voids.smaller_angles(smile.problem, part)[0, k] == pytest.approx(CUTOFF - 1e-6)
 
 
-def test_edges_are_the_ligaments_of_the_outer_rows(smile: StudyResults) -> None:
+def test_edges_are_the_outer_rows_whose_middle_is_shown(smile: StudyResults) -> None:
     part = smile.response.sel(structure="altered")
     assert closed_voids.on_edges(from_dataset(part, 15.0)).sum() == 2 * 14
-
-
-def test_a_study_without_places_shows_the_middle_of_the_top_edge(smile: StudyResults) -> None:
     (place,) = places(smile.problem, smile.response)
     assert place.name == "unit (7, 14)"
 

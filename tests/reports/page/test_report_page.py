@@ -50,16 +50,13 @@ def test_page_is_small_and_self_contained(html: str) -> None:
     assert not any(href.startswith("http") for href in links.hrefs.values())
 
 
-def test_links_lead_somewhere(html: str, report: Path) -> None:
+def test_links_lead_somewhere_and_inlined_tables_are_the_files(html: str, report: Path) -> None:
     links = Links(html)
     for href in links.hrefs.values():
         if href.startswith("#"):
             assert href[1:] in links.ids
         elif not href.endswith(".nc"):  # the fixture's datasets have no files
             assert href.startswith("data:") or (report / href).is_file()
-
-
-def test_inlined_tables_are_the_files_beside_the_page(html: str, report: Path) -> None:
     tables = {name: href for name, href in Links(html).hrefs.items() if href.startswith("data:")}
     names = ("design", "facts", "loss_history", "robustness", "top_edge")
     assert sorted(tables) == [f"{name}.csv" for name in names]

@@ -166,12 +166,9 @@ def test_diagrams_show_medians_against_errors() -> None:
     assert not np.isnan(drawn).any()
 
 
-def test_exponents_are_fitted_to_the_larger_sizes() -> None:
+def test_exponents_and_profiles() -> None:
     units = np.array([225, 900, 3600])
     assert charts.exponent(units, 1e-6 * units**1.5, 900) == pytest.approx(1.5)
     assert np.isnan(charts.exponent(units[:2], np.ones(2), 900))
-
-
-def test_profiles_count_evaluations_to_a_share_of_the_decrease() -> None:
     needed = optimisers.costs({"small": contest()})
     assert needed == {"own sqp": [3.0, 3.0, 3.0], "scipy SLSQP": [3.0, np.inf, np.inf]}

@@ -35,16 +35,13 @@ def test_a_cube_seen_from_the_top_is_a_square() -> None:
     assert ink[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].all()
 
 
-def test_the_nearer_body_hides_the_farther_one() -> None:
+def test_nearer_bodies_hide_farther_ones_and_far_faces_are_not_drawn() -> None:
     low = Body(cube().vertices, cube().triangles, "#ff0000")
     high = Body(cube().vertices * 0.5 + [0.0, 0.0, 20.0], cube().triangles, "#0000ff")
     for bodies in ([low, high], [high, low]):
         image = picture(bodies, 224, elevation=90.0)
         red, _, blue = image[image.shape[0] // 2, image.shape[1] // 2]
         assert (red, blue > 100) == (0, True)
-
-
-def test_faces_that_look_away_are_not_drawn() -> None:
     turned = Body(cube().vertices, cube().triangles[:, ::-1], COLOUR)
     assert not np.array_equal(picture([turned], 224), picture([cube()], 224))
 
@@ -83,15 +80,12 @@ def test_the_page_shows_every_sheet_and_plate(package: Path, page: str) -> None:
         assert (package.parent / link).is_file()
 
 
-def test_its_pictures_have_ink(page: str) -> None:
+def test_its_pictures_have_ink_and_it_tells_the_bill(page: str) -> None:
     found = re.findall(r'src="data:image/png;base64,([^"]+)"', page)
     assert len(found) >= 6
     for text in found:
         with Image.open(io.BytesIO(base64.b64decode(text))) as image:
             assert (np.asarray(image.convert("L")) < 230).sum() > 100
-
-
-def test_it_tells_the_figures_of_the_bill(page: str) -> None:
     for words in ("<strong>6</strong>units", "A1 to C2", "shims with spares", "laser.kerf"):
         assert words in page
 

@@ -189,14 +189,11 @@ def test_separation_is_the_distance_of_convex_polygons(seed: int, x: float, y: f
         assert found == pytest.approx(shapely.distance(first, second), abs=1e-9)
 
 
-def test_separation_of_non_convex_units_is_on_the_safe_side() -> None:
+def test_separation_is_on_the_safe_side_and_ignores_padding() -> None:
     dart = np.array([[0.0, 0.0], [4.0, 0.0], [1.0, 1.0], [0.0, 4.0]])
     square = np.array([[2.0, 2.0], [3.0, 2.0], [3.0, 3.0], [2.0, 3.0]])
     true = shapely.distance(shapely.Polygon(dart), shapely.Polygon(square))
     assert float(separation(jnp.asarray(np.stack([dart, square])))) <= true
-
-
-def test_separation_ignores_padding() -> None:
     one, other = convex_ring(3, (0.0, 0.0)), convex_ring(4, (9.0, 1.0))
     padded = np.stack([np.concatenate([ring, ring[-1:]]) for ring in (one, other)])
     plain = np.stack([one, other])

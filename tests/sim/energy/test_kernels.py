@@ -181,6 +181,12 @@ def test_mixed_derivatives(random_case: Case) -> None:
     )
     for one, other in zip(found[: len(wanted)], wanted, strict=True):
         assert_equal(one, np.asarray(other))
+    some = np.array([1, 4])
+    every = mixed(random_case, np.arange(len(random_case.net.unit)))
+    chosen = mixed(random_case, some)
+    for all_of_it, part in zip(every[:6], chosen[:6], strict=True):
+        np.testing.assert_array_equal(part[some], all_of_it[some])
+        assert np.count_nonzero(part) <= all_of_it[some].size
 
 
 def mixed(of: Case, which: Ints) -> Sensitivity:
@@ -191,15 +197,6 @@ def mixed(of: Case, which: Ints) -> Sensitivity:
     ligament_kernels.mixed(of.motion, net, located(of.motion, net), of.direction, which, out)
     void_contact_kernels.add_mixed(of.motion, net, of.direction, which, out)
     return out
-
-
-def test_mixed_derivatives_of_some_ligaments_alone(random_case: Case) -> None:
-    some = np.array([1, 4])
-    every = mixed(random_case, np.arange(len(random_case.net.unit)))
-    chosen = mixed(random_case, some)
-    for all_of_it, part in zip(every[:6], chosen[:6], strict=True):
-        np.testing.assert_array_equal(part[some], all_of_it[some])
-        assert np.count_nonzero(part) <= all_of_it[some].size
 
 
 def room(motion: Floats, net: NetworkArrays) -> float:

@@ -131,15 +131,12 @@ def test_a_load_that_cannot_be_simulated_is_avoided(caplog: pytest.LogCaptureFix
     assert "no step is short enough" in caplog.text
 
 
-def test_places_are_spread_alike_each_time() -> None:
+def test_places_are_spread_alike_and_copies_left_out() -> None:
     places = spread_places(SHAKEN, 11, 3)
     np.testing.assert_array_equal(places, spread_places(SHAKEN, 11, 3))
     assert places.shape == (11, 3)
     assert places.min() >= 0.0
     assert (np.histogram(places[:, 0], 2, (0, 1))[0] >= 4).all()
-
-
-def test_directions_that_the_symmetry_repeats_are_left_out() -> None:
     folded = without_copies(SHAKEN, scene().updated(symmetry="C4"))
     assert folded.direction == (0.0, np.pi / 2)
     assert without_copies(SHAKEN, scene()) == SHAKEN

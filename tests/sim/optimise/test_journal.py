@@ -158,16 +158,13 @@ def test_aux_keeps_its_shape_and_bits(tmp_path: Path) -> None:
     assert aux_again.shape == (2, 2)
 
 
-def test_two_processes_cannot_share_a_journal(tmp_path: Path) -> None:
+def test_a_journal_is_for_one_process_within_its_block(tmp_path: Path) -> None:
     with (
         Journal(tmp_path / "run", "a"),
         pytest.raises(JournalInUseError, match="another process"),
         Journal(tmp_path / "run", "a"),
     ):
         pass
-
-
-def test_a_closed_journal_refuses_work(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "run", "a")
     with pytest.raises(RuntimeError, match="with statement"):
         journal.wrap(rosenbrock)(np.zeros(2))

@@ -30,7 +30,7 @@ def path(rig: Rig, loads: Floats) -> Floats:
     return solve_case(StaticSolver(rig.topology, loads), rig.values, rig.drive)[0]
 
 
-def test_every_asked_state_is_in_balance_and_follows_the_load() -> None:
+def test_every_state_is_in_balance_and_inside_the_barrier() -> None:
     rig, loads = squeezed(9.0), np.linspace(0.1, 1.0, 7)
     states = path(rig, loads)
     assert states.dtype == np.float64
@@ -39,9 +39,6 @@ def test_every_asked_state_is_in_balance_and_follows_the_load() -> None:
         moved = state.reshape(-1, 3)
         np.testing.assert_allclose(moved[LEFT + 4], [[-9.0 * load, 0.0, 0.0]] * 5)
         np.testing.assert_array_equal(moved[LEFT], 0.0)
-
-
-def test_states_in_contact_stay_inside_the_barrier() -> None:
     rig = squeezed(11.0)
     angles = void_angles(rig, path(rig, np.linspace(0.1, 1.0, 10)))
     assert angles.min() > BARRIER

@@ -122,15 +122,12 @@ def test_motions_of_another_kind_are_no_copies(other: sim.MotionLaw) -> None:
     assert found(scene((MIDDLE, sim.LinearRamp(2.0, 1.0, 0.0)), (MIDDLE, other))) == [0, 1]
 
 
-def test_the_image_of_rotating_squares() -> None:
+def test_squares_have_an_image_and_other_structures_none() -> None:
     image = quarter_turn(LATTICE, LATTICE.vertices)
     assert image is not None
     np.testing.assert_array_equal(image.unit[[0, 4, 24, 20, 12]], [4, 24, 20, 0, 12])
     ends = np.sort(image.unit[LATTICE.ligament_units], axis=1)
     np.testing.assert_array_equal(ends, np.sort(LATTICE.ligament_units[image.ligament], axis=1))
-
-
-def test_a_structure_without_the_symmetry_has_no_image() -> None:
     space = design_space(LATTICE, np.array([6, 7]))
     moved = np.asarray(space.vertices(0.01 * np.ones(space.n_variables)))
     assert quarter_turn(LATTICE, moved) is None

@@ -30,7 +30,7 @@ def test_lattice_is_the_references() -> None:
     )
 
 
-def test_inertia_and_damping_are_the_references() -> None:
+def test_inertia_damping_and_regions_are_the_references() -> None:
     scene, stored = scenes.scene_a(), scenes.reference("A")
     values = sim.concrete_parameters(scene, scene.lattice.vertices)
     np.testing.assert_allclose(
@@ -38,9 +38,6 @@ def test_inertia_and_damping_are_the_references() -> None:
     )
     damping = stored["damping_per_dof_tonne_per_s_or_tonne_mm2_per_s"]
     np.testing.assert_allclose(values.damping, np.tile(damping, (225, 1)), rtol=1e-7)
-
-
-def test_regions_are_the_references() -> None:
     stored = scenes.reference("A")
     np.testing.assert_array_equal(scenes.scene_a().objective.region, stored["roi_blocks"])
     designed = sum(int(stored[f"mask_{kind}_design"].sum()) for kind in ("horizontal", "vertical"))

@@ -21,9 +21,6 @@ def test_the_p_mean_goes_from_the_mean_to_the_largest() -> None:
     assert found == sorted(found)
     assert 0.97 < found[-1] < 1.0
     assert found[1] == pytest.approx(np.sqrt(0.5 * 0.04 + 0.25 * 1.0 + 0.25 * 0.49))
-
-
-def test_the_gradient_of_the_p_mean() -> None:
     slope = jax.grad(lambda x: combined(x, WEIGHTS, 8.0))(LOSSES)
     steps = np.eye(3)
     found = central(lambda h: [float(combined(LOSSES + h * e, WEIGHTS, 8.0)) for e in steps], 1e-6)

@@ -84,10 +84,13 @@ def test_a_structure_that_starts_all_but_touching() -> None:
     assert_clear_in_contact(rig, path(rig, StaticSolver(rig.topology, np.ones(1))))
 
 
-def test_units_that_overlap_at_rest_are_named() -> None:
+def test_what_overlaps_or_is_driven_through_is_an_error() -> None:
     rig = squeezed(1.0, bias_deg=53.0, distance=DISTANCE)
     with pytest.raises(SimulationError, match="overlap at rest"):
         path(rig, StaticSolver(rig.topology, np.ones(1)))
+    rig = Rig(rotating_squares(3), np.array([3]), np.array([4]), LinearRamp(-10.0, 1.0), DISTANCE)
+    with pytest.raises(SimulationError, match="try "):
+        path(rig, StaticSolver(rig.topology, np.array([0.2, 1.0])))
 
 
 def square(x: float, y: float = 0.0) -> Floats:
@@ -107,12 +110,6 @@ def test_units_meet_that_were_far_apart_at_rest() -> None:
     states = path(rig, StaticSolver(rig.topology, np.linspace(0.25, 1.0, 4)))
     assert_clear_in_contact(rig, states)
     assert states[-1, 1, 0] < -0.4
-
-
-def test_what_is_driven_through_a_held_unit_is_an_error() -> None:
-    rig = Rig(rotating_squares(3), np.array([3]), np.array([4]), LinearRamp(-10.0, 1.0), DISTANCE)
-    with pytest.raises(SimulationError, match="try "):
-        path(rig, StaticSolver(rig.topology, np.array([0.2, 1.0])))
 
 
 @pytest.mark.parametrize("solver", DYNAMIC)

@@ -8,11 +8,18 @@ from sim.solvers import held_dofs, held_values
 TIMES = np.linspace(0.0, 2.0, 41)
 
 
-def test_harmonic_is_the_authors() -> None:
+def test_motions_are_the_authors() -> None:
     motion = np.asarray(sim.Harmonic(4.5, 2.0, np.deg2rad(30.0))(jnp.asarray(TIMES)))
     wave = 4.5 * np.sin(4 * np.pi * TIMES)
     wanted = np.stack([wave * np.sqrt(0.75), wave * 0.5, np.zeros(41)], axis=1)
     np.testing.assert_allclose(motion, wanted, atol=1e-12)
+    motion = np.asarray(sim.TanhRamp(-15.0, 2.0)(jnp.asarray(TIMES)))
+    wanted = -15.0 * (1 + np.tanh(6 * (2 * TIMES / 2.0 - 1))) / 2
+    np.testing.assert_allclose(motion[:, 0], wanted, atol=1e-12)
+    assert motion[-1, 0] / -15.0 == pytest.approx(0.99999386, abs=1e-8)
+    motion = np.asarray(sim.LinearRamp(3.0, 2.0, np.pi / 2)(jnp.asarray(TIMES)))
+    np.testing.assert_allclose(motion[:, 1], 1.5 * TIMES, atol=1e-12)
+    np.testing.assert_allclose(motion[:, 0], 0.0, atol=1e-12)
 
 
 def test_switched_on_harmonic_starts_from_rest_and_grows_to_the_full_sine() -> None:
@@ -23,28 +30,12 @@ def test_switched_on_harmonic_starts_from_rest_and_grows_to_the_full_sine() -> N
     np.testing.assert_allclose(motion[late, 0], wanted, atol=1e-6)
 
 
-def test_tanh_ramp_is_the_authors() -> None:
-    motion = np.asarray(sim.TanhRamp(-15.0, 2.0)(jnp.asarray(TIMES)))
-    wanted = -15.0 * (1 + np.tanh(6 * (2 * TIMES / 2.0 - 1))) / 2
-    np.testing.assert_allclose(motion[:, 0], wanted, atol=1e-12)
-    assert motion[-1, 0] / -15.0 == pytest.approx(0.99999386, abs=1e-8)
-
-
-def test_linear_ramp() -> None:
-    motion = np.asarray(sim.LinearRamp(3.0, 2.0, np.pi / 2)(jnp.asarray(TIMES)))
-    np.testing.assert_allclose(motion[:, 1], 1.5 * TIMES, atol=1e-12)
-    np.testing.assert_allclose(motion[:, 0], 0.0, atol=1e-12)
-
-
-def test_measured_series_are_interpolated() -> None:
+def test_measured_series_are_interpolated_for_all_or_each() -> None:
     knots = np.array([0.0, 1.0, 2.0])
     series = sim.TimeSeries(knots, np.array([[0.0, 0, 0], [2.0, -1.0, 0.1], [2.0, 0, 0.3]]))
     motion = np.asarray(series(jnp.array([0.0, 0.5, 1.0, 1.5])))
     np.testing.assert_allclose(motion[1], [1.0, -0.5, 0.05])
     np.testing.assert_allclose(motion[3], [2.0, -0.5, 0.2])
-
-
-def test_each_driven_unit_may_have_a_series_of_its_own() -> None:
     series = sim.TimeSeries(np.array([0.0, 2.0]), np.arange(12.0).reshape(2, 2, 3))
     held = held_dofs(np.array([0]), np.array([4, 2]))
     values = held_values(held, np.array([4, 2]), series(np.array([0.0, 2.0])))

@@ -11,13 +11,10 @@ def lattice(request: pytest.FixtureRequest) -> Lattice:
     return made
 
 
-def test_ring_neighbours_are_inverse_and_stay_in_their_unit(lattice: Lattice) -> None:
+def test_rings_stay_in_their_unit_and_run_counter_clockwise(lattice: Lattice) -> None:
     every = np.arange(lattice.n_vertices)
     np.testing.assert_array_equal(lattice.previous_vertex[lattice.next_vertex], every)
     np.testing.assert_array_equal(lattice.unit[lattice.next_vertex], lattice.unit)
-
-
-def test_polygons_are_counter_clockwise(lattice: Lattice) -> None:
     here, there = lattice.vertices, lattice.vertices[lattice.next_vertex]
     cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
     assert (np.bincount(lattice.unit, cross) > 0).all()

@@ -33,9 +33,6 @@ def test_shifts_are_evenly_spread_and_keep_the_ligaments() -> None:
     assert shifts.std() == pytest.approx(0.45 / np.sqrt(3), rel=0.02)
     ends = shifts[:, LATTICE.ligaments]
     np.testing.assert_allclose(ends[:, :, 0], ends[:, :, 1], atol=1e-12)
-
-
-def test_equal_seeds_give_equal_copies() -> None:
     np.testing.assert_array_equal(draw(0.45, 7), draw(0.45, 7))
     assert np.abs(draw(0.45, 7) - draw(0.45, 8)).max() > 0.1
 

@@ -13,7 +13,7 @@ from tests.sim.structures import CORNERS, LEFT, MIDDLE, NONE, Rig, rotating_squa
 from tests.sim.time_integration import pulse
 
 
-def test_order_conditions_of_the_method() -> None:
+def test_order_conditions_and_damping_of_the_method() -> None:
     stages, nodes, end = ESDIRK3.stages, ESDIRK3.nodes, ESDIRK3.stages[-1]
     np.testing.assert_allclose(stages.sum(axis=1), nodes, atol=1e-15)
     np.testing.assert_allclose(stages[1:] @ nodes, nodes[1:] ** 2 / 2, atol=1e-15)
@@ -21,10 +21,7 @@ def test_order_conditions_of_the_method() -> None:
     assert end @ nodes == pytest.approx(1 / 2)
     assert end @ nodes**2 == pytest.approx(1 / 3)
     assert end @ stages @ nodes == pytest.approx(1 / 6)
-
-
-def test_the_method_damps_what_it_cannot_resolve() -> None:
-    """L-stability: the amplification of a mode vanishes with its frequency growing."""
+    # l-stability: the amplification of a mode vanishes with its frequency growing
     stages, one = ESDIRK3.stages, np.ones(4)
     for z, bound in ((-1e3, 2e-2), (-1e6, 2e-5), (1e4j, 1e-3)):
         growth = 1 + z * stages[-1] @ np.linalg.solve(np.eye(4) - z * stages, one)

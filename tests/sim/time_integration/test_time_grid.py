@@ -51,12 +51,9 @@ def test_output_outside_of_the_run_or_out_of_order_is_refused(asked: list[float]
         time_grid.check_output_times(np.array(asked), 1.0)
 
 
-def test_simpson_weights_are_exact_for_cubics_those_of_an_even_number_for_lines() -> None:
+def test_simpson_weights_and_stage_times() -> None:
     assert time_grid.simpson_weights(11, 2.0) @ np.linspace(0.0, 2.0, 11) ** 3 == pytest.approx(4.0)
     even = 3 * np.linspace(0.0, 2.0, 10) + 1
     assert time_grid.simpson_weights(10, 2.0) @ even == pytest.approx(8.0)
-
-
-def test_stage_times_of_every_step() -> None:
     times, nodes = np.array([0.0, 1.0, 3.0]), np.array([0.0, 0.5, 1.0])
     np.testing.assert_array_equal(time_grid.stage_times(times, nodes), [0.0, 0.5, 1.0, 2.0, 3.0])

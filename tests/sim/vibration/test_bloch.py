@@ -53,9 +53,6 @@ def test_strain_changes_the_bands_and_keeps_them_real(cell: UnitCell) -> None:
     rest, under = bands(cell, waves), bands(cell, waves, found)
     assert under.min() > -1e-6 * under.max()
     assert np.abs(under[1:-1] / rest[1:-1] - 1).max() > 0.05
-
-
-def test_a_strain_beyond_the_contacts_is_refused(cell: UnitCell) -> None:
     for beyond in (-0.3, -0.6):
         with pytest.raises(SimulationError, match=r"no (stable )?equilibrium beyond"):
             strained(cell, np.diag([beyond, beyond]), NO_LOOSE)
