@@ -35,22 +35,31 @@ def draw_quality(track: xr.Dataset, found: TrackQuality, load_axis: str) -> Figu
     residual = track["camera_residual"].values[there]
     sigma = track["sigma"].transpose("time", "unit", "dof").values[:, there]
     scale = np.array([1 / found.pixel, 1 / found.pixel, 180 / np.pi])
-    typical = np.nanmedian(sigma * scale, axis=0)
+    sigma = sigma * scale
+    place, turn = np.hypot(sigma[..., 0], sigma[..., 1]) / np.sqrt(2), sigma[..., 2]
     maps = [
         ("a", "First frame less design, px", np.hypot(*residual.T)),
-        ("b", "Uncertainty of the place, px", np.hypot(*typical[:, :2].T) / np.sqrt(2)),
-        ("c", "Uncertainty of the rotation, deg", typical[:, 2]),
+        ("b", "Uncertainty of the place, px", _percentiles(place.T, [50])[0]),
+        ("c", "Uncertainty of the rotation, deg", _percentiles(turn.T, [50])[0]),
     ]
-    for place, (letter, title, values) in enumerate(maps):
-        left = 2.0 + 60.0 * place
+    for column, (letter, title, values) in enumerate(maps):
+        left = 2.0 + 60.0 * column
         style.letter(drawn, left, 1.0, letter, title)
         axes = style.place(drawn, left, _TOP, _SIZE, _SIZE)
         shown = _map(axes, specimen, values)
         bar = style.place(drawn, left + _SIZE - 3.0, _TOP + 12.0, 1.8, _SIZE - 24.0)
         drawn.colorbar(shown, cax=bar)
     _arrows(drawn.axes[0], specimen, residual)
-    _courses(drawn, track, found, sigma * scale, _axis(track, load_axis))
+    _courses(drawn, track, found, place, _axis(track, load_axis))
     return drawn
+
+
+def _percentiles(values: np.ndarray, percents: list[int]) -> np.ndarray:
+    """Returns percentiles of the rows (rows, n) over what is known; NaN of rows without."""
+    known = np.isfinite(values).any(axis=1)
+    out = np.full((len(percents), len(values)), np.nan)
+    out[:, known] = np.nanpercentile(values[known], percents, axis=1)
+    return out
 
 
 def _map(axes: Axes, specimen: SpecimenOutlines, values: np.ndarray) -> PolyCollection:
@@ -90,7 +99,7 @@ def _courses(
     drawn: Figure,
     track: xr.Dataset,
     found: TrackQuality,
-    sigma: np.ndarray,
+    sigma: np.ndarray,  # (frames, units) of the place, px
     axis: tuple[np.ndarray, str],
 ) -> None:
     load, label = axis
@@ -108,9 +117,7 @@ def _courses(
     axes.set(xlabel=label, ylabel="of the units, %", xlim=span, ylim=(0, None))
     style.letter(drawn, 92.0, 66.0, "e", "Uncertainty of the place: median, 90 % of the units")
     axes = style.place(drawn, 104.0, 73.0, 70.0, 47.0)
-    place = np.hypot(sigma[..., 0], sigma[..., 1]) / np.sqrt(2)
-    with np.errstate(all="ignore"):
-        low, middle, high = np.nanpercentile(place, [5, 50, 95], axis=1)
+    low, middle, high = _percentiles(sigma, [5, 50, 95])
     axes.fill_between(load, low, high, color=style.PALE, linewidth=0)
     axes.plot(load, middle, color=style.INTACT)
     if np.isfinite(found.floor[0]):

@@ -129,8 +129,9 @@ def _spacing(centre: Floats) -> float:
 
 def _resting(pose: Floats, sigma: Floats) -> int:
     """Returns length of the run of frames in the beginning that show no motion."""
-    with np.errstate(invalid="ignore"):
-        away = np.sqrt(np.nanmean((pose / np.maximum(sigma, 1e-12)) ** 2, axis=(1, 2)))
+    square = (pose / np.maximum(sigma, 1e-12)) ** 2
+    with np.errstate(invalid="ignore"):  # nothing is seen in some frames
+        away = np.sqrt(np.nansum(square, axis=(1, 2)) / np.isfinite(square).sum(axis=(1, 2)))
     moving = np.flatnonzero(~(away < _RESTING))
     moving = moving[moving > 0]
     return int(moving[0]) if len(moving) else len(pose)

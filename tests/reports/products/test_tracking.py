@@ -13,7 +13,7 @@ from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.tracking.frames import Frame, import_video
 from reports.__main__ import main
-from reports.products.tracking import advice, overlay, track_quality
+from reports.products.tracking import advice, figure, overlay, track_quality
 from reports.products.tracking.track_quality import ExposureStatistics, StreamProperties
 from tests.reports.conftest import Failing
 
@@ -132,6 +132,19 @@ def test_causes_of_a_poor_fit(track: xr.Dataset, change: dict[str, Any], told: s
     assert "poor fit" in first
     assert told in first
     assert ("focus" in first) == ("blur" in change)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_unit_that_is_never_seen_and_a_frame_without_any_are_drawn(track: xr.Dataset) -> None:
+    for name in ("displacement", "sigma"):
+        track[name][:, LOST] = np.nan
+        track[name][-1] = np.nan
+    track["quality"][:, LOST], track["quality"][-1] = 2, 2
+    found = of(track)
+    assert found.resting == RESTING
+    assert np.isfinite(found.sigma).all()
+    drawn = figure.draw_quality(track, found, "time")
+    assert np.isnan(drawn.axes[2].collections[0].get_array().filled(np.nan)[LOST])
 
 
 def test_units_are_coloured_and_lost_ones_hatched(track: xr.Dataset) -> None:
