@@ -39,9 +39,7 @@ class MotionModes(NamedTuple):
     rest: Floats  # (frames, units) what is left
 
 
-def separate_modes(
-    motion: Floats, near: Ints, noise: float, start: Floats | None = None
-) -> MotionModes:
+def separate_modes(motion: Floats, near: Ints, noise: float) -> MotionModes:
     """Separates the shapes of one degree of freedom.
 
     What is missing is filled in time first, then by the shapes themselves, until it stays.
@@ -50,10 +48,9 @@ def separate_modes(
         motion: (frames, units), NaN where missing.
         near: (units, k) the nearest ones of each.
         noise: standard deviation that the motions have at least.
-        start: (frames, units) values of what is missing to begin with.
     """
     known = np.isfinite(motion)
-    full = filled(motion) if start is None else np.where(known, motion, start)
+    full = filled(motion)
     for _ in range(_FILLINGS):
         left, values, right = np.linalg.svd(full, full_matrices=False)
         floor = max(_EMERGING * float(np.median(values)), noise * np.sqrt(full.shape).sum())

@@ -10,8 +10,9 @@ from sim.core import Floats, Ints, Reals
 
 _KNOTS, _FEWEST = 7, 4
 """Frames that a polynomial passes through, at most and at least."""
-_ROUNDS, _SETTLED = 8, 0.05
-"""Rounds of the motion between frames, at most; a change, over the noise, that ends them."""
+_SLOWEST = 0.56
+"""Square of the ratio of what an order changes to that of the one before, at most; what the orders
+beyond change goes on so."""
 _PART = 400
 """Frames that are looked at together, beside some before and after."""
 _FEW = 9
@@ -39,7 +40,7 @@ def at_frame_times(
 
     A picture shows the mean over its exposure, x + bend x'' to second order, at its rows' times.
     What the units did in between is told by the few shapes in which they move together, nearly
-    without noise: x(t) = seen - (m(t + late) + bend m''(t + late) - m(t)) of the motion m in these.
+    without noise: the pose changes by m(t) - bend m''(t) - m(t + late) of the motion m in these.
     Polynomials pass through the nearest frames, and have the order with the least error: noise, and
     what the highest changes.
 
@@ -80,33 +81,27 @@ def at_frame_times(
 def _carried(
     shown: Floats, told: Floats, time: Floats, late: Floats, bend: Floats, near: Ints
 ) -> _Carried:
-    """Carries poses (frames, units) to the frames' times.
-
-    The motion in between is that of the poses themselves, and so found in rounds.
-    """
-    weights = [_weights(time, late, bend, knots) for knots in _orders(len(time))]
-    noise = float(np.nanmedian(told)) if np.isfinite(told).any() else 1.0
-    pose, together, share = shown, None, np.ones(shown.shape[1])
-    for _ in range(_ROUNDS):
-        if shown.shape[1] < _FEW:
-            together = motion_modes.filled(pose)
-        else:
-            found = motion_modes.separate_modes(pose, near, noise, together)
-            together, share = found.amplitude @ found.shape, np.sum(found.shape**2, axis=0)
-        change = np.array(
-            [
-                np.einsum("fuk,fuk->fu", w, np.take_along_axis(together[:, :, None], at, 0))
-                for at, w in weights
-            ]
+    """Carries poses (frames, units) to the frames' times."""
+    together, share = motion_modes.filled(shown), np.ones(shown.shape[1])
+    if shown.shape[1] >= _FEW and np.isfinite(told).any():
+        found = motion_modes.separate_modes(shown, near, float(np.nanmedian(told)))
+        together, share = found.amplitude @ found.shape, np.sum(found.shape**2, axis=0)
+    changes, growths = [], []
+    for knots in range(_FEWEST, min(_KNOTS + 1, len(time)) + 1):
+        at, weight = _weights(time, late, bend, knots)
+        changes.append(
+            np.einsum("fuk,fuk->fu", weight, np.take_along_axis(together[..., None], at, 0))
         )
-        growth = np.array([share * np.sum(weight**2, axis=2) for _, weight in weights])
-        off = (change[:-1] - change[-1]) ** 2 - growth[-1] * told**2
-        error = np.nansum(off / told**2 + np.where(np.isfinite(told), growth[:-1], 0.0), axis=2)
-        best = np.argmin(error, axis=0), np.arange(len(time))
-        before, pose = pose, shown - change[best]
-        if np.sqrt(np.nanmean((pose - before) ** 2)) < _SETTLED * noise:
-            break
-    return _Carried(pose, 1 + growth[best], np.nan_to_num(np.maximum(off[best], 0.0)))
+        growths.append(share * np.sum(weight**2, axis=2))
+    change, growth = np.array(changes), np.array(growths)
+    off = (change[:-1] - change[-1]) ** 2 - growth[-1] * told**2
+    error = np.nansum(off / told**2 + np.where(np.isfinite(told), growth[:-1], 0.0), axis=2)
+    best = np.argmin(error, axis=0), np.arange(len(time))  # all units tell of the order
+    step = np.diff(change, axis=0)[-3:]
+    size = np.nanmean(step**2, axis=2)
+    ratio = np.minimum(np.sqrt(size[-1:] / np.maximum(size[:1], 1e-30)), _SLOWEST)[0][:, None]
+    left = np.nan_to_num(np.maximum(off[best], 0.0) + ratio * step[-2:][0] ** 2)
+    return _Carried(shown + change[best], 1 + growth[best], left / (1 - np.sqrt(ratio)) ** 2)
 
 
 def middle_speed(motion: Reals, time: Floats, frame: int) -> Floats:
@@ -121,24 +116,20 @@ def middle_speed(motion: Reals, time: Floats, frame: int) -> Floats:
     return np.asarray(np.linalg.norm(np.tensordot(weight, motion[near, :, :2], 1), axis=1))
 
 
-def _orders(frames: int) -> range:
-    return range(_FEWEST, min(_KNOTS + 1, frames) + 1)
-
-
 def _weights(time: Floats, late: Floats, bend: Floats, knots: int) -> tuple[Ints, Floats]:
-    """Returns the frames (frames, units, knots) about each pose, and their weights in its change.
+    """Returns the frames (frames, units, knots) about each, and their weights in a pose's change.
 
-    That is the polynomial's value at its own time, with bend times its second derivative, less the
-    value at the frame's.
+    That is the value of the polynomial through the poses as they were seen at the frame's time,
+    less bend times its second derivative, less the pose seen.
     """
     frame = np.arange(len(time))[:, None]
-    first = frame - (knots - 1) // 2 - ((knots % 2 == 0) & (late < 0))
+    first = frame - (knots - 1) // 2 - ((knots % 2 == 0) & (late > 0))
     near = np.clip(first, 0, len(time) - knots)[..., None] + np.arange(knots)
     unit = float(np.ptp(time)) / (len(time) - 1)
-    apart = (time[near] - (time[:, None] + late)[..., None]) / unit
-    order = np.arange(knots)
+    seen = np.take_along_axis((time[:, None] + late)[..., None], near, 0)
+    apart = (seen - time[:, None, None]) / unit
     wanted = np.zeros((knots, 2))
     wanted[0, 0], wanted[2, 1] = 1.0, 2.0 / unit**2
-    solved = np.linalg.solve(apart[..., None, :] ** order[:, None], wanted[None, None])
-    weight = solved[..., 0] + bend[..., None] * solved[..., 1]
+    solved = np.linalg.solve(apart[..., None, :] ** np.arange(knots)[:, None], wanted[None, None])
+    weight = solved[..., 0] - bend[..., None] * solved[..., 1]
     return near, weight - (near == frame[..., None])

@@ -42,7 +42,7 @@ from pipeline.tracking.reference_frame import (
     outlines_seen,
     recognise,
 )
-from sim.core import Floats, Ints, Reals, Singles
+from sim.core import Floats, Ints, Mask, Reals, Singles
 
 LOG = logging.getLogger(__name__)
 
@@ -57,6 +57,8 @@ _CODED = 1.8
 """Likeness from which on a codec is at work."""
 _UNSURE = 0.25
 """Standard deviation of a pose that is not known at its frame's time, px."""
+_VAGUE = 5.0
+"""Or so many times the usual."""
 _CHANGED = 0.005
 """Part of the pixels that differ in a picture that is shown again, at most."""
 
@@ -145,8 +147,17 @@ def track_video(
     if setup.follows_supports and setup.held is not None:
         missed += camera_variance(sigma, specimen.centre, setup.held)
     sigma = np.where(np.isfinite(motion), np.hypot(sigma, np.sqrt(missed)), np.nan)
+    vague = _vague(sigma, calibration.pixel)
+    motion[vague], sigma[vague], qualities[vague] = np.nan, np.nan, POOR_FIT
     start = float(times[0])
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended)
+
+
+def _vague(sigma: Reals, pixel: float) -> Mask:
+    """Marks poses (frames, units) of which next to nothing is known, beside the others."""
+    place = sigma[..., :2].max(axis=-1) / pixel
+    known = np.isfinite(place)
+    return known & (place > max(_UNSURE, _VAGUE * float(np.median(place[known]))))
 
 
 def _exposure(tracker: Tracker, motion: Reals, times: Floats) -> float:

@@ -23,7 +23,7 @@ def shown(name: str, folder: Path, frames: int) -> tuple[WildClip, Track]:
     ("name", "frames", "rms", "lost"),
     [
         ("hand_over_a_corner", 18, 0.012, 0.02),
-        ("motion_blur", 10, 0.008, 0.0),
+        ("motion_blur", 10, 0.01, 0.0),
         ("rolling_shutter", 10, 0.007, 0.0),
         ("fisheye", 6, 0.01, 0.0),
         ("red_on_teal", 6, 0.03, 0.0),

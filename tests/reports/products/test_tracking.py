@@ -144,7 +144,8 @@ def test_a_unit_that_is_never_seen_and_a_frame_without_any_are_drawn(track: xr.D
     assert found.resting == RESTING
     assert np.isfinite(found.sigma).all()
     drawn = figure.draw_quality(track, found, "time")
-    assert np.isnan(drawn.axes[2].collections[0].get_array().filled(np.nan)[LOST])
+    shown: Any = drawn.axes[2].collections[0].get_array()
+    assert np.ma.getmaskarray(shown)[LOST]
 
 
 def test_units_are_coloured_and_lost_ones_hatched(track: xr.Dataset) -> None:
