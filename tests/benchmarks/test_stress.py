@@ -120,7 +120,7 @@ def test_equilibria_off_balance_and_units_in_one_another_are_found(plate: Stress
     assert not all(check.kept for check in checks.admissible(plate, moved))
 
 
-def test_saddles_are_found() -> None:
+def test_saddles_and_stages_off_balance_are_found() -> None:
     """A straight chain, pressed, stays in balance beyond the load at which it buckles."""
     chain = pressed(squares(9, 1, bias=0.0), 0.04)
     straight = np.zeros((1, chain.topology.n_dofs))
@@ -129,9 +129,6 @@ def test_saddles_are_found() -> None:
     made = values_of(checks.balanced(chain, answer._replace(displacement=straight)))
     assert made["distance from balance, mm/mm"].kept
     assert not made["falling directions of an equilibrium"].kept
-
-
-def test_stages_off_balance_are_found() -> None:
     case = shaken(squares(3), Harmonic(1.0, 30.0), duration=0.01, frequency=30.0)
     times = np.linspace(0.0, 0.01, 11)
     solver = ImplicitSolver(case.topology, times, times)

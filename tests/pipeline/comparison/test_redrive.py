@@ -43,7 +43,7 @@ def pressed(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return scene_of(asked, folder)
 
 
-def test_a_path_of_equilibria_is_found_again(pressed: Scene) -> None:
+def test_motions_along_a_path_and_in_time_are_found_again(pressed: Scene) -> None:
     track, motion = tracked(pressed, 1.0, 40)
     held = filter_held_motion(track, pressed)
     assert len(held.unit) == 10
@@ -55,9 +55,6 @@ def test_a_path_of_equilibria_is_found_again(pressed: Scene) -> None:
     assert made.failure is None
     assert np.sqrt(np.mean((made.displacement - motion) ** 2)) < 0.5 * SIGMA[0]
     assert (made.drive_force[10:, 0] < 0).all()  # it pushes to the left
-
-
-def test_a_motion_in_time_is_found_again() -> None:
     scene = scene_of(problem.load(FIG2 / "problem.yaml", "quick"), FIG2)
     track, motion = tracked(scene, 0.5, 61)
     structure = PosedStructure(scene, scene.lattice.vertices)

@@ -116,7 +116,7 @@ def test_a_damaged_drawing_is_caught(tmp_path: Path, name: str, suffix: str) -> 
     assert any(expected in words for words in told), told
 
 
-def test_a_unit_without_its_own_id_is_caught(tmp_path: Path) -> None:
+def test_other_ids_units_colours_and_text_are_caught(tmp_path: Path) -> None:
     bare = [curve for curve in sheet() if curve.layer != "ENGRAVE"]
     told = [f"part {name}: no id is engraved on it" for name in ("A1", "B1")]
     assert found(drawn(tmp_path / "units_1.dxf", bare)) == told
@@ -124,9 +124,6 @@ def test_a_unit_without_its_own_id_is_caught(tmp_path: Path) -> None:
     other = [replace(c, part=swapped[c.part]) if c.layer == "ENGRAVE" else c for c in sheet()]
     told = [f"part {name}: engraving beyond its outline" for name in ("B1", "A1")]
     assert found(drawn(tmp_path / "units_2.dxf", other)) == told
-
-
-def test_wrong_units_one_colour_twice_and_text_are_caught(tmp_path: Path) -> None:
     drawing = read_drawing(write_dxf(tmp_path / "sheet.dxf", sheet(), units=1))
     assert found(drawing) == ["the drawing: $INSUNITS is 1, not 4 (millimetres)"]
     path = write_dxf(tmp_path / "sheet.dxf", sheet(), colours={"CUT_INNER": 1})

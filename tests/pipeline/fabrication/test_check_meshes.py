@@ -192,16 +192,13 @@ def test_a_misplaced_part_fails(tmp_path: Path, place: tuple[float, float], expe
     assert any(words.startswith(expected) for words in found), found
 
 
-def test_a_broken_object_is_caught_on_its_plate(tmp_path: Path) -> None:
+def test_a_broken_plate_is_caught_and_what_is_no_plate_refused(tmp_path: Path) -> None:
     bodies, places = plate()
     bodies["C1"] = without_a_face(bodies["C1"])
     found = plate_faults(write_3mf(tmp_path / "plate.3mf", bodies, places))
     assert found == ["part C1: its surface has holes"]
     path = write_3mf(tmp_path / "plate.3mf", {"": prism(unit().outline)}, {"": (30.0, 30.0)})
     assert plate_faults(path) == ["part : an object without a name"]
-
-
-def test_half_a_3mf_and_other_units_than_millimetres_are_refused(tmp_path: Path) -> None:
     path = write_3mf(tmp_path / "plate.3mf", *plate(), unit="inch")
     with pytest.raises(UserError, match="not millimeter"):
         read_3mf(path)

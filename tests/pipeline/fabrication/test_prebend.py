@@ -79,15 +79,12 @@ def test_a_shim_of_the_paper_towards_the_centroids_is_bent_to_an_arc() -> None:
     assert prebend(other, one, settings).strain == pytest.approx(found.strain)
 
 
-def test_slots_of_the_regular_lattice_leave_its_shims_straight() -> None:
+def test_slots_that_turn_bend_their_shims_others_leave_them_straight() -> None:
     net = network(built.design(), "cloaked")
     specimen = build_specimen(net, Fabrication(), ("toy", ""), DESIGN)
     assert max(ligament.strain for ligament in specimen.ligaments) < 1e-9
     assert specimen.bent == []
-
-
-def test_a_slot_that_has_to_turn_is_followed_by_the_one_across() -> None:
-    """The corner of unit B1 that faces A1 is so sharp that its slot cannot follow the ligament."""
+    # the corner of unit B1 that faces A1 is so sharp that its slot cannot follow the ligament
     design = sharpened()
     specimen = build_specimen(network(design, "cloaked"), Fabrication(), ("toy", ""), DESIGN)
     (bent,) = (one for one in specimen.ligaments if one.name == "A1 - B1")

@@ -61,7 +61,7 @@ def square(side: float) -> Polygon:
     return Polygon([(half, 0.0), (0.0, half), (-half, 0.0), (0.0, -half)])
 
 
-def test_unit_of_the_paper_has_slots_towards_its_centroid_three_mm_deep() -> None:
+def test_slots_are_three_mm_deep_and_more_in_a_sharp_corner() -> None:
     polygon = square(9.594)
     for slot in place_slots(polygon, corners(polygon), ASKED, polygon):
         assert slot.depth == 3.0
@@ -70,9 +70,6 @@ def test_unit_of_the_paper_has_slots_towards_its_centroid_three_mm_deep() -> Non
         # at a right angle the wall beside the slot grows as fast as one goes in
         assert slot.truncation == pytest.approx(0.225 + 0.1)
         assert slot.wall == pytest.approx((3.0 - 0.225) / np.sqrt(2.0))
-
-
-def test_slot_in_a_sharp_corner_goes_deeper_for_its_walls() -> None:
     half = np.radians(15.0)
     arm = 20.0 * np.array([np.cos(half), np.sin(half)])
     polygon = Polygon([(0.0, 0.0), arm * [1, -1], arm])

@@ -59,16 +59,13 @@ def test_a_moment_and_the_rotation_that_it_makes(tmp_path: Path) -> None:
     np.testing.assert_allclose(moved(loaded)[-1], moved(turned)[-1], atol=1e-8)
 
 
-def test_several_drives_act_at_once(tmp_path: Path) -> None:
+def test_several_drives_act_at_once_in_all_directions(tmp_path: Path) -> None:
     scene = posed(tmp_path, f"drives:\n  - {PUSH}\n  - {TURN}")
     np.testing.assert_array_equal(scene.loads.driven, [2, *RIGHT])
     end = moved(scene)[-1]
     np.testing.assert_allclose(end[2], [0.0, 0.0, np.deg2rad(10.0)])
     alone = moved(posed(tmp_path, f"drive: {TURN}"))[-1]
     assert (end[RIGHT, 0] < alone[RIGHT, 0]).all()
-
-
-def test_directions_of_one_are_load_cases_of_all(tmp_path: Path) -> None:
     push = PUSH.replace("direction: 180 deg, free: [uy]", "directions: [180 deg, 90 deg]")
     asked = load(written(tmp_path, f"drives:\n  - {push}\n  - {TURN}"))
     assert from_canonical(canonical_json(asked)) == asked

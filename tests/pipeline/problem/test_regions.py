@@ -95,7 +95,7 @@ def test_what_a_void_cuts_loose_can_go_too(tmp_path: Path) -> None:
     assert void_units(loose) == void_units(whole)
 
 
-def test_an_image_keeps_its_proportions_and_turns(placed: Placed, tmp_path: Path) -> None:
+def test_pictures_keep_their_proportions_and_turn(placed: Placed, tmp_path: Path) -> None:
     (shape,) = placed(f"image: {{ file: {draw(tmp_path / 'l.png').name}, width: 80 mm }}")
     assert extents(shape) == pytest.approx((80.0, 80 * 59 / 39), rel=0.02)
     points = np.array(shape)
@@ -107,9 +107,6 @@ def test_an_image_keeps_its_proportions_and_turns(placed: Placed, tmp_path: Path
     turned = placed(f"image: {{ {given}, orientation: 90 deg }}")
     x, y = (np.array(upright[0]) - [200, 210]).T
     np.testing.assert_allclose(np.array(turned[0]), np.stack([200 - y, 210 + x], axis=1))
-
-
-def test_a_drawing_is_read_as_an_image_is(placed: Placed, tmp_path: Path) -> None:
     path = "M30 20 h15 v45 h25 v15 h-40 z"
     svg = tmp_path / "l.svg"
     svg.write_text(f'<svg xmlns="http://www.w3.org/2000/svg"><path d="{path}"/></svg>')

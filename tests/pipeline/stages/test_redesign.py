@@ -45,9 +45,6 @@ def test_a_design_on_which_both_laws_agree_is_kept(study: Path, tmp_path: Path) 
     angle, distance = law_comparison.cloak_losses(moved)
     assert distance == pytest.approx(moved["loss"].sel(structure="cloaked").item(), rel=1e-9)
     assert distance == pytest.approx(angle, rel=1e-9)
-
-
-def test_another_design_is_optimised_from_there(study: Path, tmp_path: Path) -> None:
     first = datasets.read(study / "design.nc", "design")
     second, moved = reconsidered(study, tmp_path, 1.11)
     losses = second["loss"].values[0]

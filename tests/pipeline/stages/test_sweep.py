@@ -59,7 +59,7 @@ def test_the_first_key_of_a_grid_varies_fastest(whole: xr.Dataset) -> None:
     np.testing.assert_array_equal(whole["value"], expected)
 
 
-def test_a_case_is_the_problem_with_its_setting(folder: Path, whole: xr.Dataset) -> None:
+def test_a_case_has_its_setting_or_says_why_it_failed(folder: Path, whole: xr.Dataset) -> None:
     path = folder / "other" / "problem.yaml"
     path.parent.mkdir()
     text = (folder / "problem.yaml").read_text().partition("sweep:")[0]
@@ -68,9 +68,6 @@ def test_a_case_is_the_problem_with_its_setting(folder: Path, whole: xr.Dataset)
     loss, _, _ = Evaluator(scene, make_plan(scene))(np.zeros(scene.space.n_variables))
     assert float(whole["loss_altered"][3]) == pytest.approx(loss, rel=1e-9)
     assert float(whole["loss"][3]) == pytest.approx(loss, rel=1e-9)  # of a design without a change
-
-
-def test_a_case_that_fails_keeps_its_reason(whole: xr.Dataset) -> None:
     fine = [True, True, False, True, True, False]
     assert (whole["status"].values == "ok").tolist() == fine
     assert np.isfinite(whole["loss"].values).tolist() == fine
@@ -138,9 +135,6 @@ def test_values_side_by_side() -> None:
     listed = [{"a.b": "1 mm", "c": "x"}, {"a.b": "2 mm", "c": "y"}]
     assert list(sweep_cases.list_settings(wanted)) == listed
     assert sweep_cases.parameter_unit(wanted, "c") == "1"
-
-
-def test_directions_are_load_cases_of_one_scene() -> None:
     grid = {"drive.directions": ["0 deg", "90 deg"], "drive.frequency": ["2 Hz", "3 Hz", "4 Hz"]}
     wanted = Sweep.model_validate({"grid": grid})
     parts = [sweep_cases.select_groups(wanted, k, 2) for k in range(2)]

@@ -45,14 +45,11 @@ def drive(scene: Scene, **asked: object) -> ImperfectDrive:
     return imperfect_drive(scene, 0, DriveFaults.model_validate(asked), 1.0, unload=False)
 
 
-def test_a_drive_without_faults_is_the_planned_one(study: tuple[Problem, Scene]) -> None:
+def test_each_fault_of_a_drive_does_what_it_says(study: tuple[Problem, Scene]) -> None:
     scene = study[1]
     every = np.asarray(drive(scene)(TIMES))
     planned = np.asarray(scene.loads.motions[0](TIMES))
     np.testing.assert_allclose(every, np.repeat(planned[:, None], 5, axis=1), atol=1e-12)
-
-
-def test_each_fault_of_a_drive_does_what_it_says(study: tuple[Problem, Scene]) -> None:
     scene = study[1]
     faults: dict[str, tuple[object, list[float]]] = {
         "gain": (0.5, [-2, 0]),

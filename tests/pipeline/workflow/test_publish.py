@@ -57,9 +57,6 @@ def test_it_holds_to_the_profile(crate: Path, monkeypatch: pytest.MonkeyPatch) -
     settings.requirement_severity = models.Severity.REQUIRED
     found = services.validate(settings).get_issues()
     assert [each.message for each in found] == []
-
-
-def test_it_tells_real_from_synthetic_data(crate: Path) -> None:
     graph = json.loads((crate / "ro-crate-metadata.json").read_text())["@graph"]
     origin = {each["@id"]: each.get("keywords") for each in graph}
     assert origin["published/track.nc"] == "synthetic"

@@ -42,25 +42,22 @@ def _with_second_case(response: xr.Dataset) -> xr.Dataset:
     return whole.assign_attrs(response.attrs)
 
 
-def test_each_load_case_has_its_rows(two: StudyResults) -> None:
+def test_each_load_case_has_rows_snapshots_and_a_curve(two: StudyResults) -> None:
     assert abscissa.load_names(two.problem, two.response) == ("compression 180°", "shear 90°")
     path = abscissa.abscissa_of(two.problem, two.response)
     found: dict[str, Fact] = {fact.key: fact for fact in facts.measure_facts(two, path)}
-    one, other = (found[f"rotation_altered_case{case}"].value for case in (0, 1))
-    assert other == pytest.approx(3 * one)
-    assert found["rotation_altered"].value == pytest.approx(2 * one)
+    turns = [found[f"rotation_altered_case{case}"].value for case in (0, 1)]
+    assert turns[1] == pytest.approx(3 * turns[0])
+    assert found["rotation_altered"].value == pytest.approx(2 * turns[0])
     assert "shear 90°" in found["rotation_altered_case1"].label
     columns = tables.path(two)
     names = ("altered_rotation_deg_compression_180deg", "altered_rotation_deg_shear_90deg")
     first, second = (np.asarray(columns[name]) for name in names)
     np.testing.assert_allclose(second, 3 * first)
-
-
-def test_each_load_case_has_snapshots_and_a_curve_of_its_own(two: StudyResults) -> None:
     shown = snapshot_grid.rows(two)
     assert [row.case for row in shown][:4] == [0, 1, 0, 1]
     assert len({row.label for row in shown[:4]}) == 4
-    made, path = Figure(), abscissa.abscissa_of(two.problem, two.response)
+    made = Figure()
     curves.measure_panel(made.add_subplot(), two, path, measures.measure_of(two.problem))
     drawn = {line.get_label(): line for line in made.axes[0].get_lines()}
     one, other = (drawn[f"Cloaked, {name}"] for name in ("compression 180°", "shear 90°"))

@@ -120,7 +120,7 @@ def test_copies_are_measured_like_the_structure(shield: StudyResults, smile: Stu
         np.testing.assert_allclose(found, factor * copies["rotation"], rtol=1e-12)
 
 
-def test_failed_copies_are_counted_and_left_out(shield: StudyResults) -> None:
+def test_copies_stand_in_a_table_and_failed_ones_are_counted(shield: StudyResults) -> None:
     copies = shield.scatter
     assert copies is not None
     second = spreads(copies["loss"], copies)[1]
@@ -129,9 +129,6 @@ def test_failed_copies_are_counted_and_left_out(shield: StudyResults) -> None:
     assert second.middle == pytest.approx(np.median(good))
     assert second.high == pytest.approx(np.percentile(good, 95))
     assert "1 failed" in values(shield)["copies_geometry_5"].note
-
-
-def test_the_copies_stand_in_a_table_of_their_own(shield: StudyResults) -> None:
     table = robust_table(shield)
     assert table is not None
     assert table.rows[0][0] == "as designed"
@@ -205,7 +202,7 @@ def test_losses_under_either_law_of_contact(shield: StudyResults) -> None:
     assert found["contact_angle_cloaked"].note.startswith("8 pairs of units overlap")
 
 
-def test_the_second_design_is_told_of_and_drawn(shield: StudyResults) -> None:
+def test_a_second_design_is_drawn_and_a_kept_one_not(shield: StudyResults) -> None:
     assert values(shield)["second_design"].ours == "optimised again, 6 evaluations"
     assert values(shield)["second_rotation_reduction"].value == pytest.approx(90.0)
     assert values(shield)["second_overlaps"].value == 1
@@ -213,9 +210,6 @@ def test_the_second_design_is_told_of_and_drawn(shield: StudyResults) -> None:
     measure = made(shield).axes[-4]
     assert "Cloaked, no overlap" in {line.get_label() for line in measure.lines}
     assert "dashed" in figure.loading_path_figure(shield).caption
-
-
-def test_a_kept_design_is_not_drawn_twice(shield: StudyResults) -> None:
     whole = shield.datasets["geometric_design"].assign(best_evaluation=("method", [0]))
     alone = whole.isel(evaluation=slice(1))
     kept = changed(shield, "geometric_design", alone)

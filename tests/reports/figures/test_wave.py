@@ -26,20 +26,17 @@ def test_void_angles_of_rotated_squares(smile: StudyResults) -> None:
     np.testing.assert_allclose(np.sort(angles, axis=1), [[50.0, 130.0]] * len(angles), atol=1e-9)
 
 
-def test_voids_close_by_the_turn_of_one_unit_against_the_other(smile: StudyResults) -> None:
+def test_voids_close_by_turns_and_the_middle_of_an_edge_is_shown(smile: StudyResults) -> None:
     part = smile.response.sel(structure="intact").isel(case=0, time=[0]).copy(deep=True)
     structure = from_dataset(part, 15.0)
     rest = closed_voids.rest_angles(structure)
     k = int(np.argmin(rest[:, 0]))
     assert not closed_voids.closed(smile.problem, part).any()
-    place = {"time": 0, "unit": int(structure.ligament_unit[k, 0]), "dof": 2}
-    part["displacement"][place] = CUTOFF - rest[k, 0] - 1e-6
+    turned = {"time": 0, "unit": int(structure.ligament_unit[k, 0]), "dof": 2}
+    part["displacement"][turned] = CUTOFF - rest[k, 0] - 1e-6
     found = closed_voids.closed(smile.problem, part)[0]
     assert found[k]
     assert closed_voids.smaller_angles(smile.problem, part)[0, k] == pytest.approx(CUTOFF - 1e-6)
-
-
-def test_edges_are_the_outer_rows_whose_middle_is_shown(smile: StudyResults) -> None:
     part = smile.response.sel(structure="altered")
     assert closed_voids.on_edges(from_dataset(part, 15.0)).sum() == 2 * 14
     (place,) = places(smile.problem, smile.response)
@@ -59,11 +56,9 @@ def test_relative_error_by_hand(smile: StudyResults) -> None:
     expected = size(altered - intact) / size(intact)
     assert float(found.sel(structure="altered")) == pytest.approx(expected)
     assert float(found.sel(structure="intact")) == 0.0
-
-
-def test_the_size_of_a_wave_is_its_largest_in_time(smile: StudyResults) -> None:
     scale = measures.scales(smile.problem)
-    falling, time = smile.response.copy(deep=True), smile.response["time"]
-    falling["displacement"] = falling["displacement"][:, :, ::-1].assign_coords(time=time)
+    falling = smile.response.copy(deep=True)
+    turned = falling["displacement"][:, :, ::-1].assign_coords(time=smile.response["time"])
+    falling["displacement"] = turned
     at_end = measures.size_of_intact(smile.response, scale, static=True)
     np.testing.assert_allclose(measures.size_of_intact(falling, scale, static=False), at_end)

@@ -119,16 +119,6 @@ def test_words_of_a_problem_are_escaped(quick: StudyResults) -> None:
     assert json.loads(data[1])["cases"][0].startswith("α")
 
 
-def test_a_text_that_looks_like_a_formula_is_a_text() -> None:
-    """A spreadsheet computes no cell."""
-    words = ["=1+1", "@a", "+cmd", "-5 mm", "−5 mm", "a=b", "-1e-3", "", "=HYPERLINK(1)"]
-    table = Table("t.csv", "", {"word": words, "number": np.linspace(-1.0, 1.0, len(words))})
-    rows = list(csv.reader(StringIO(table.csv.decode())))
-    shown = ["'=1+1", "'@a", "'+cmd", "'-5 mm", "−5 mm", "a=b", "-1e-3", "", "'=HYPERLINK(1)"]
-    assert [row[0] for row in rows[1:]] == shown
-    assert rows[1][1] == "-1"
-
-
 def test_cells_of_a_table() -> None:
     columns = {
         "number": np.array([1.0 / 3.0, np.nan]),
@@ -138,3 +128,10 @@ def test_cells_of_a_table() -> None:
     assert Table("t.csv", "", columns).csv.decode() == (
         'number,count,"text, quoted"\n0.3333333333,7,"a, ""b"""\n,-8,plain\n'
     )
+    # a spreadsheet computes no cell
+    words = ["=1+1", "@a", "+cmd", "-5 mm", "−5 mm", "a=b", "-1e-3", "", "=HYPERLINK(1)"]
+    table = Table("t.csv", "", {"word": words, "number": np.linspace(-1.0, 1.0, len(words))})
+    rows = list(csv.reader(StringIO(table.csv.decode())))
+    shown = ["'=1+1", "'@a", "'+cmd", "'-5 mm", "−5 mm", "a=b", "-1e-3", "", "'=HYPERLINK(1)"]
+    assert [row[0] for row in rows[1:]] == shown
+    assert rows[1][1] == "-1"

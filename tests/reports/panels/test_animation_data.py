@@ -36,7 +36,7 @@ def static(motion: np.ndarray) -> dict[str, Any]:
     return panels.payload(panels.Animation(axis, ["compression"], [clip(motion)], [field]))
 
 
-def test_motion_is_right_within_the_stated_error(study: StudyResults) -> None:
+def test_motion_is_right_within_the_stated_error_at_kept_times(study: StudyResults) -> None:
     data = panels.payload(shielding_animation(study))
     shift, turn = panels.animation_data.quantisation_error(data)
     assert shift < 1e-4
@@ -50,9 +50,6 @@ def test_motion_is_right_within_the_stated_error(study: StudyResults) -> None:
             error = np.abs(np.array(part["step"]) * levels - exact)
             assert error[..., :2].max() <= 1.001 * shift
             assert error[..., 2].max() <= 1.001 * turn
-
-
-def test_axis_keeps_both_ends(study: StudyResults) -> None:
     data = panels.payload(shielding_animation(study))
     values = decoded(data["axis"]["values"], "<f4")
     assert values[0] == 0.0

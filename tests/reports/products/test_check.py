@@ -36,15 +36,12 @@ def test_a_picture_and_a_line_of_cost(tmp_path: Path, capsys: pytest.CaptureFixt
         assert min(picture.size) > 500
 
 
-def test_every_descent_and_the_one_before_it_cost(tmp_path: Path) -> None:
+def test_descents_and_imperfect_copies_take_time(tmp_path: Path) -> None:
     path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
     more = "law: geometric", "optimiser: { angle: { evaluations: 3 }, descents: 2,"
     text = path.read_text().replace("law: angle", more[0]).replace("optimiser: {", more[1])
     path.write_text(text)
     assert "14 evaluations of the design" in cost_line(load(path), scene_of(load(path), tmp_path))
-
-
-def test_imperfect_copies_of_a_robust_design_take_time(tmp_path: Path) -> None:
     asked = load(static.write(tmp_path, static.HEART, size=30))
     objective = asked.objective.model_copy(update={"robust": Robust(copies=64)})
     robust, scene = asked.model_copy(update={"objective": objective}), scene_of(asked, tmp_path)
@@ -77,7 +74,7 @@ def drawn(folder: Path, draw: Callable[[ImageDraw.ImageDraw], object]) -> Path:
     return static.write(folder, IMAGE + static.MIMIC)
 
 
-def test_an_inverted_picture_is_doubted(tmp_path: Path) -> None:
+def test_inverted_pictures_and_far_pushes_are_doubted(tmp_path: Path) -> None:
     def ring(on: ImageDraw.ImageDraw) -> None:
         on.rectangle((5, 5, 195, 195), fill=0)
         on.ellipse((60, 60, 140, 140), fill=255)
@@ -86,9 +83,6 @@ def test_an_inverted_picture_is_doubted(tmp_path: Path) -> None:
     assert "logo.png shows 2 outlines" in told
     disc = drawn(tmp_path, lambda on: on.ellipse((60, 60, 140, 140), fill=0))
     assert doubted(disc) == []
-
-
-def test_a_far_push_is_doubted(tmp_path: Path) -> None:
     path = static.write(tmp_path, static.HOLE, size=5, amplitude=40.0)
     (told,) = doubted(path)
     assert told.startswith("the drive goes 40 mm, 5")

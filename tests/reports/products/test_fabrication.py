@@ -71,16 +71,13 @@ def page(package: Path) -> str:
     return page_of(package.with_name("index.html"), package)
 
 
-def test_the_page_shows_every_sheet_and_plate(package: Path, page: str) -> None:
+def test_the_page_shows_every_sheet_and_plate_and_tells_the_bill(package: Path, page: str) -> None:
     shown = re.findall(r'<figcaption><a href="([^"]+)">', page)
     drawings = [*package.glob("laser/*_nominal.dxf"), *package.glob("*/*.3mf")]
     wanted = {path.relative_to(package.parent).as_posix() for path in drawings}
     assert set(shown) == wanted | {"cloaked/print/assembled.stl"}
     for link in re.findall(r'href="(cloaked/[^"]+)"', page):
         assert (package.parent / link).is_file()
-
-
-def test_its_pictures_have_ink_and_it_tells_the_bill(page: str) -> None:
     found = re.findall(r'src="data:image/png;base64,([^"]+)"', page)
     assert len(found) >= 6
     for text in found:

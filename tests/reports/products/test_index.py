@@ -56,13 +56,10 @@ def test_it_works_from_disk_and_leads_to_what_is_there(html: str, results: Path)
     assert wanted | {"benchmark/fig2.csv", "stress/index.html"} <= set(links.hrefs.values())
 
 
-def test_figures_come_first_and_drafts_are_marked(results: Path, html: str) -> None:
+def test_figures_come_first_drafts_are_marked_claims_judged(results: Path, html: str) -> None:
     names = [(built.name, built.figure, built.draft) for built in inventory.reports(results)]
     assert names == [("fig2", True, False), ("fig2@quick", False, True)]
     assert html.index("fig2/report/index.html") < html.index(">DRAFT<")
-
-
-def test_claims_are_judged_where_the_study_is_built(html: str) -> None:
     assert "Figure 2: <a" in html
     assert "<code>make fig7</code> builds it" in html
     tables = {table["name"]: table for table in index_report.tables(())}

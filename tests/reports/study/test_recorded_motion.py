@@ -66,9 +66,7 @@ def facts(study: StudyResults) -> dict[str, Fact]:
     return {fact.key: fact for fact in kinds.kind_of(study.problem).facts(study)}
 
 
-def test_measured_motions_are_told_beside_simulated_ones(
-    filmed: dict[str, StudyResults],
-) -> None:
+def test_measured_motions_are_told(filmed: dict[str, StudyResults]) -> None:
     shaken, shield, smile = (facts(filmed[name]) for name in ("study", "shield", "smile"))
     for name in ("altered", "cloaked"):
         value = shaken[f"peak_to_peak_{name}"].value
@@ -83,9 +81,6 @@ def test_measured_motions_are_told_beside_simulated_ones(
     assert smile["measured_contraction_intact"].value == expected
     error = smile["contraction_error_altered"].value
     assert smile["measured_contraction_error_altered"].value == pytest.approx(error, rel=1e-6)
-
-
-def test_the_residual_of_every_recording_is_told(filmed: dict[str, StudyResults]) -> None:
     study = filmed["shield"]
     found = facts(study)
     assert found["altered_0_rmse_ux"].value == 0.5
@@ -93,9 +88,7 @@ def test_the_residual_of_every_recording_is_told(filmed: dict[str, StudyResults]
     assert found["altered_0_correlation"].group == f"Recording “altered_0”: experiment ({LABEL})"
 
 
-def test_the_player_shows_it_and_the_residual(
-    filmed: dict[str, StudyResults],
-) -> None:
+def test_the_player_shows_it_and_the_residual(filmed: dict[str, StudyResults]) -> None:
     study = filmed["study"]
     data = payload(kinds.kind_of(study.problem).animation(study))
     names = [clip["name"] for clip in data["structures"]]
@@ -115,9 +108,7 @@ def test_the_player_shows_it_and_the_residual(
     assert all(field["residual"] for field in data["fields"])
 
 
-def test_pages_say_that_it_is_synthetic_unless_filmed(
-    filmed: dict[str, StudyResults],
-) -> None:
+def test_pages_say_that_it_is_synthetic_unless_filmed(filmed: dict[str, StudyResults]) -> None:
     study = filmed["smile"]
     html = rendered(study_report(study), {})
     assert f"<b>{LABEL}</b>: these recordings were rendered" in html
