@@ -7,7 +7,9 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets, posing, problem
+from pipeline.__main__ import run_stage
 from pipeline.datasets import provenance
+from pipeline.datasets.tables import Kind
 from pipeline.posing.to_scene import altered_lattice_of
 from pipeline.problem import Problem
 from tests.pipeline.samples import filled
@@ -35,6 +37,23 @@ def design(
         | {"direction": ("case", np.rad2deg(posing.case_directions(asked)))},
         {"shipped_method": "sqp"},
     )
+
+
+def chunk(stage: str, kind: Kind, folder: Path, out: Path, of: tuple[int, int]) -> xr.Dataset:
+    """Runs a part of a stage for a study and this design: (number, count)."""
+    words = ["--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")]
+    words += ["--chunk", str(of[0]), "--chunks", str(of[1]), "--out", str(out)]
+    assert run_stage(stage, ["run", *words]) == 0
+    return datasets.read(out, kind)
+
+
+def joined(stage: str, kind: Kind, folder: Path, out: Path, count: int) -> bytes:
+    """Runs a stage in so many parts and gathers them."""
+    parts = [out.with_name(f"{kind}_{k}.nc") for k in range(count)]
+    for k, part in enumerate(parts):
+        chunk(stage, kind, folder, part, (k, count))
+    assert run_stage(stage, ["gather", "--parts", *map(str, parts), "--out", str(out)]) == 0
+    return out.read_bytes()
 
 
 def write(path: Path) -> Path:

@@ -26,18 +26,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def run(folder: Path, out: Path, chunk: int = 0, chunks: int = 1) -> xr.Dataset:
-    words = [
-        *("run", "--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")),
-        *("--chunk", str(chunk), "--chunks", str(chunks), "--out", str(out)),
-    ]
-    assert run_stage("monte_carlo", words) == 0
-    return datasets.read(out, "scatter")
-
-
 @pytest.fixture(scope="module")
 def whole(folder: Path) -> xr.Dataset:
-    return run(folder, folder / "scatter.nc")
+    return unchanged.chunk("monte_carlo", "scatter", folder, folder / "scatter.nc", (0, 1))
 
 
 def test_every_copy_is_another_one(whole: xr.Dataset) -> None:
@@ -50,12 +41,8 @@ def test_every_copy_is_another_one(whole: xr.Dataset) -> None:
 
 @pytest.mark.usefixtures("whole")
 def test_parts_join_to_the_whole(folder: Path, tmp_path: Path) -> None:
-    parts = [tmp_path / f"scatter_{k}.nc" for k in range(2)]
-    for k, part in enumerate(parts):
-        run(folder, part, k, 2)
-    out = tmp_path / "scatter.nc"
-    assert run_stage("monte_carlo", ["gather", "--parts", *map(str, parts), "--out", str(out)]) == 0
-    assert out.read_bytes() == (folder / "scatter.nc").read_bytes()
+    made = unchanged.joined("monte_carlo", "scatter", folder, tmp_path / "scatter.nc", 2)
+    assert made == (folder / "scatter.nc").read_bytes()
 
 
 def test_without_noise_every_copy_is_the_design(folder: Path) -> None:

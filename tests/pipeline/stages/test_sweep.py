@@ -38,18 +38,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder_of(tmp_path_factory.mktemp("hole"), GRID)
 
 
-def run(folder: Path, out: Path, chunk: int = 0, chunks: int = 1) -> xr.Dataset:
-    words = [
-        *("run", "--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")),
-        *("--chunk", str(chunk), "--chunks", str(chunks), "--out", str(out)),
-    ]
-    assert run_stage("sweep", words) == 0
-    return datasets.read(out, "sweep")
-
-
 @pytest.fixture(scope="module")
 def whole(folder: Path) -> xr.Dataset:
-    return run(folder, folder / "sweep.nc")
+    return unchanged.chunk("sweep", "sweep", folder, folder / "sweep.nc", (0, 1))
 
 
 def test_the_first_key_of_a_grid_varies_fastest(whole: xr.Dataset) -> None:
@@ -74,14 +65,10 @@ def test_a_case_has_its_setting_or_says_why_it_failed(folder: Path, whole: xr.Da
     assert all("cloak" in reason for reason in whole["status"].values[[2, 5]])
 
 
-def test_parts_join_to_the_whole(folder: Path, whole: xr.Dataset, tmp_path: Path) -> None:
-    del whole
-    parts = [tmp_path / f"sweep_{k}.nc" for k in range(4)]
-    for k, part in enumerate(parts):
-        run(folder, part, k, 4)
-    out = tmp_path / "sweep.nc"
-    assert run_stage("sweep", ["gather", "--parts", *map(str, parts), "--out", str(out)]) == 0
-    assert out.read_bytes() == (folder / "sweep.nc").read_bytes()
+@pytest.mark.usefixtures("whole")
+def test_parts_join_to_the_whole(folder: Path, tmp_path: Path) -> None:
+    made = unchanged.joined("sweep", "sweep", folder, tmp_path / "sweep.nc", 4)
+    assert made == (folder / "sweep.nc").read_bytes()
 
 
 def test_a_killed_sweep_goes_on(
@@ -101,7 +88,7 @@ def test_a_killed_sweep_goes_on(
         return results(*given)  # type: ignore[arg-type]
 
     monkeypatch.setattr(setting_losses, "results", counted)
-    xr.testing.assert_identical(run(folder, out), whole)
+    xr.testing.assert_identical(unchanged.chunk("sweep", "sweep", folder, out, (0, 1)), whole)
     assert len(simulated) == 3
     assert out.read_bytes() == (folder / "sweep.nc").read_bytes()
     assert kept.read_bytes() == begun.read_bytes()

@@ -71,14 +71,11 @@ def test_simulated_designs_are_feasible_and_seen_and_accepted_ones_improve(
     assert (np.diff([each.loss for each in seen if each.accepted]) < 0).all()
 
 
-def test_losses_of_accepted_designs_decrease() -> None:
+def test_losses_decrease_and_steps_respect_radius_and_bounds() -> None:
     found = solved(problems.rosenbrock_in_disc())
     accepted = [e.loss for e in found.evaluations if e.accepted]
     assert (np.diff(accepted) < 0).all()
     assert found.loss == min(accepted) == found.evaluations[found.best].loss
-
-
-def test_steps_respect_the_radius_and_the_bounds() -> None:
     radius = 0.1
     found = solved(problems.shifted_bowl(), radius=radius, radius_max=radius)
     designs = np.array([e.x for e in found.evaluations])
