@@ -64,15 +64,7 @@ class View(NamedTuple):
 
 
 class Renderer:
-    """Draws a specimen that moves.
-
-    Args:
-        specimen: its units.
-        motion: of them.
-        view: how it is seen.
-        cover: hands, bolts, whatever else is in view.
-        seed: of the noise.
-    """
+    """Draws the units of a specimen as they move, seen in a view, under whatever covers them."""
 
     def __init__(
         self,

@@ -29,19 +29,9 @@ def write(
     ink: Ink,
     paper: Paper,
 ) -> int:
-    """Writes the sheets; the same specimen gives the same bytes.
+    """Writes the sheets, titled, and returns their number; the same specimen gives the same bytes.
 
-    Args:
-        path: the PDF.
-        specimen: the units.
-        marks: what goes on them.
-        labels: of the units.
-        title: at the head of every page.
-        ink: dark faces with light marks, for a bright board, or the other way round.
-        paper: size of the pages.
-
-    Returns:
-        Number of pages.
+    The ink is dark faces with light marks, for a bright board, or the other way round.
 
     Raises:
         UserError: a unit is larger than a page.

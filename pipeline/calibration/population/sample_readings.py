@@ -75,10 +75,9 @@ def stack_readings(
     samples: Sequence[str],
     points: int,
 ) -> tuple[Readings, list[list[str]]]:
-    """Stacks the curves, kind by kind in the order of the emulators.
+    """Stacks the curves, kind by kind in the order of the emulators; all readings are used.
 
-    Returns:
-        the readings, all used, and by kind the name of the curve that each reading is of.
+    Also returns, by kind, the name of the curve that each reading is of.
     """
     rows: list[list[tuple[SampleCurve, int]]] = []
     for kind, emulator in emulators.items():

@@ -52,16 +52,8 @@ def place_id(words: str, outline: Polygon, body: Polygon, settings: Labels) -> P
     """Places an id inside an outline, as large, as upright and as central as there is room for.
 
     Where slots leave no room even for the smallest letters, they cut through the letters; where
-    the body leaves none, the letters lose a corner.
-
-    Args:
-        words: the id.
-        outline: of the part, with slots.
-        body: the same without slots.
-        settings: preferred size of the letters.
-
-    Returns:
-        None if it has no room even so, or could not be read.
+    the body, the outline without slots, leaves none, the letters lose a corner. Returns None if it
+    has no room even so, or could not be read.
     """
     uncut = next(_placements(words, outline, outline, settings), None)
     if uncut is not None:
@@ -119,13 +111,7 @@ def _letter_by_letter(
 
 
 def _in_order(free: Floats, count: int, *, stacked: bool) -> Floats | None:
-    """Chooses centres (count, 2) in reading order, near to each other and to one line.
-
-    Args:
-        free: (n, 2) possible centres.
-        count: of letters.
-        stacked: below each other.
-    """
+    """Chooses free centres (count, 2) in reading order, near to each other and to one line."""
     step = _LEAST_HEIGHT * (STACK if stacked else ADVANCE)
     level = free[:, ::-1] * [-1.0, 1.0] if stacked else free  # along, across
     best, least = None, np.inf

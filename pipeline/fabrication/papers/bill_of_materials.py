@@ -61,16 +61,10 @@ def write_bill(
     prints: Mapping[str, PrintEstimate],
     infill: float,
 ) -> None:
-    """Writes the bill of materials of a specimen.
+    """Writes the bill of materials of a specimen whose units have an areal density, tonne/mm^2.
 
-    Args:
-        path: the CSV to write.
-        specimen: to be built.
-        settings: of the fabrication.
-        density: areal density of the units, tonne/mm^2.
-        contents: ids of the parts in each sheet, plate and fixture, by its path in the package.
-        prints: what the printed ones of them take.
-        infill: share of their inside that is filled.
+    By path in the package: ids of the parts in each sheet, plate and fixture, and what printed ones
+    take; of their inside the share `infill` is filled.
     """
     stream = io.StringIO()
     table = csv.writer(stream, lineterminator="\n")

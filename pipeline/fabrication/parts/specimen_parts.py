@@ -37,13 +37,10 @@ Strokes = tuple[Floats, ...]
 
 
 class UnbuildableUnitError(UserError):
-    """Reports a unit of a design that cannot be made, with what a picture of it needs.
+    """Reports a unit of a design that cannot be made.
 
-    Args:
-        what: the fault in one sentence, with the unit's label.
-        around: outlines to show, mm.
-        spot: where the fault is, mm.
-        words: file, key, value and remedy of the error.
+    With the fault in one sentence, the words of a user's error, and what a picture of it needs:
+    outlines around, and the spot of the fault, mm.
     """
 
     def __init__(
@@ -142,40 +139,23 @@ class Slot:
 
 @dataclass(frozen=True)
 class Unit:
-    """Holds one unit of the specimen, where it stands before any load.
+    """Holds one unit of the specimen, where it stands before any load."""
 
-    Attributes:
-        number: id in the datasets.
-        label: id on the part and in all files: column letter and row number, from the lower left.
-        column, row: lattice indices (i, j), from zero.
-        design: the polygon as designed.
-        outline: the polygon to cut: with slots, truncated tips, filleted corners.
-        slots: one for each ligament that ends here.
-        lettering: strokes of the label, to be read from the top.
-        mark: strokes of the arrow that points to +y.
-        markers: the tracking dots.
-        height: in z.
-        underside: the lettering, to be read from below, seen from the top.
-        thickened: area added beside slots so that their walls are thick enough, mm^2.
-        letter: carried instead of the id, where there is no room for that.
-        pins: holes for the pins that align its layers, where it is cut in layers.
-    """
-
-    number: int
-    label: str
-    column: int
+    number: int  # id in the datasets
+    label: str  # id on the part and in all files: column letter and row number, from the lower left
+    column: int  # lattice indices (i, j), from zero
     row: int
-    design: Polygon
-    outline: Polygon
-    slots: tuple[Slot, ...]
-    lettering: Strokes
-    mark: Strokes
-    markers: tuple[Circle, ...]
-    height: float
-    underside: Strokes = ()
-    thickened: float = 0.0
-    letter: str = ""
-    pins: tuple[Circle, ...] = ()
+    design: Polygon  # as designed
+    outline: Polygon  # the polygon to cut: with slots, truncated tips, filleted corners
+    slots: tuple[Slot, ...]  # one for each ligament that ends here
+    lettering: Strokes  # of the label, to be read from the top
+    mark: Strokes  # the arrow that points to +y
+    markers: tuple[Circle, ...]  # dots for tracking
+    height: float  # in z
+    underside: Strokes = ()  # the lettering, to be read from below, seen from the top
+    thickened: float = 0.0  # area added beside slots so that their walls are thick enough, mm^2
+    letter: str = ""  # carried instead of the id, where there is no room for that
+    pins: tuple[Circle, ...] = ()  # holes for pins that align its layers, where it has some
 
     @property
     def wall(self) -> float:
@@ -191,27 +171,17 @@ class Unit:
 
 @dataclass(frozen=True)
 class Ligament:
-    """Holds one ligament of the specimen and the shim that it takes.
+    """Holds one ligament of the specimen and the shim that it takes."""
 
-    Attributes:
-        number: id in the datasets.
-        labels: the units that it joins.
-        length: of the shim: distance of the vertices and both depths.
-        free: of the shim between the truncated mouths.
-        middle: (2,) of the ligament as designed.
-        angles: of the slots at its two ends against the ligament, counter-clockwise, rad.
-        strain: largest one of the shim before any load.
-        moment: largest one in the shim before any load, N mm.
-    """
-
-    number: int
-    labels: tuple[str, str]
-    length: float
-    free: float
-    middle: tuple[float, float]
+    number: int  # id in the datasets
+    labels: tuple[str, str]  # the units that it joins
+    length: float  # of the shim: distance of the vertices and both depths
+    free: float  # of the shim between the truncated mouths
+    middle: tuple[float, float]  # (2,) of the ligament as designed
+    # of the slots at its two ends against the ligament, counter-clockwise, rad
     angles: tuple[float, float] = (0.0, 0.0)
-    strain: float = 0.0
-    moment: float = 0.0
+    strain: float = 0.0  # largest one of the shim before any load
+    moment: float = 0.0  # largest one in the shim before any load, N mm
 
     @property
     def name(self) -> str:
