@@ -112,7 +112,9 @@ def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Meas
         style.log_values(axes)
         axes.set_ylim(low, high * (high / low) ** (room / (1.0 - room)))
     else:
-        axes.set_ylim(0, (1.1 + room) * axes.get_ylim()[1])
+        # a path rises from the left, below the legend; a motion in time swings below all of it
+        above = 1.1 + room if path.static else 1.05 / (1.0 - 1.2 * room)
+        axes.set_ylim(0, above * axes.get_ylim()[1])
 
 
 def _vanishes(problem: Problem, values: xr.DataArray) -> bool:
