@@ -12,7 +12,7 @@ import numpy as np
 from pipeline import datasets, problem
 from pipeline.fabrication.checks import STEPS, check_package
 from pipeline.fabrication.files import PackageFolder
-from pipeline.fabrication.papers import write_assembly_sheet, write_bill, write_manifest
+from pipeline.fabrication.papers import bill_rows, write_assembly_sheet, write_bill, write_manifest
 from pipeline.fabrication.parts import THIN_WALL, BuiltSpecimen, UnbuildableUnitError
 from pipeline.fabrication.readback import draw
 from pipeline.fabrication.units import build_specimen, network, summary
@@ -47,7 +47,7 @@ def work(args: argparse.Namespace) -> None:
         write_assembly_sheet(room / "assembly.pdf", specimen, settings)
         density = posed.material.density
         printing = (package.contents, package.prints, posed.infill)
-        write_bill(room / "bom.csv", specimen, settings, density, *printing)
+        write_bill(room / "bom.csv", bill_rows(specimen, settings, density, *printing))
         built = _as_built(specimen, posed, args)
         write_manifest(room, specimen, posed, args.design, built)
         check_package(room, design, args.structure, settings, pictures, bar.update)

@@ -98,12 +98,9 @@ class LoadLoss(NamedTuple):
 
 
 class LoadLosses:
-    """Computes the losses of designs under the loads of a family.
+    """Computes the losses of designs under the loads of a family, of as many periods for each.
 
-    Args:
-        scene: what the loads act on; its horizon is of as many periods for each of them.
-        family: the loads.
-        of_design: differentiable map of a design vector to parameters.
+    `of_design` is the differentiable map of a design vector to parameters.
     """
 
     def __init__(

@@ -170,12 +170,7 @@ class Evaluator:
 
 
 class _PartedMemory:
-    """Remembers the paths of all copies of a design together (``Memory``), a copy after the other.
-
-    Args:
-        whole: of the paths of all copies.
-        n_cases: of a copy.
-    """
+    """Remembers the paths of all copies of a design together (``Memory``), one after the other."""
 
     def __init__(self, whole: Memory, n_cases: int) -> None:
         self._whole, self._n_cases = whole, n_cases

@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
@@ -52,24 +52,12 @@ class BillRow:
     note: str = ""  # anything else, in words
 
 
-def write_bill(
-    path: Path,
-    specimen: BuiltSpecimen,
-    settings: Fabrication,
-    density: float,
-    contents: Mapping[str, Sequence[str]],
-    prints: Mapping[str, PrintEstimate],
-    infill: float,
-) -> None:
-    """Writes the bill of materials of a specimen whose units have an areal density, tonne/mm^2.
-
-    By path in the package: ids of the parts in each sheet, plate and fixture, and what printed ones
-    take; of their inside the share `infill` is filled.
-    """
+def write_bill(path: Path, rows: Iterable[BillRow]) -> None:
+    """Writes the bill of materials."""
     stream = io.StringIO()
     table = csv.writer(stream, lineterminator="\n")
     table.writerow(_HEADING.split())
-    for row in bill(specimen, settings, density, contents, prints, infill):
+    for row in rows:
         table.writerow(f"{v:.4f}" if isinstance(v, float) else v for v in astuple(row))
     path.write_text(stream.getvalue(), encoding="utf-8", newline="\n")
 
@@ -87,7 +75,7 @@ def read_bill(path: Path) -> list[dict[str, str]]:
         raise unreadable("the bill of materials", path, error) from error
 
 
-def bill(
+def bill_rows(
     specimen: BuiltSpecimen,
     settings: Fabrication,
     density: float,
@@ -95,7 +83,11 @@ def bill(
     prints: Mapping[str, PrintEstimate],
     infill: float,
 ) -> Iterator[BillRow]:
-    """Yields rows: each unit, kind of shim, ligament, file to cut or print, the totals."""
+    """Yields each unit, kind of shim, ligament, file to cut or print of a specimen, the totals.
+
+    Units have an areal density, tonne/mm^2. By path in the package: ids of the parts in each sheet,
+    plate and fixture, and what printed ones take; of their inside the share `infill` is filled.
+    """
     holders: dict[str, list[str]] = {}
     for file, parts in contents.items():
         for part in dict.fromkeys(parts):

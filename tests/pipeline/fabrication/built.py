@@ -8,7 +8,7 @@ import xarray as xr
 
 from pipeline import problem
 from pipeline.fabrication.files import PackageFolder
-from pipeline.fabrication.papers import write_assembly_sheet, write_bill, write_manifest
+from pipeline.fabrication.papers import bill_rows, write_assembly_sheet, write_bill, write_manifest
 from pipeline.fabrication.units import build_specimen, network
 from pipeline.problem import Problem
 from pipeline.problem.fields import SIM_UNITS
@@ -59,6 +59,7 @@ def write(folder: Path, parameters: Mapping[str, object] | None = None) -> Probl
     package.write()
     write_assembly_sheet(folder / "assembly.pdf", specimen, settings)
     printing = (package.contents, package.prints, posed.infill)
-    write_bill(folder / "bom.csv", specimen, settings, posed.material.density, *printing)
+    rows = bill_rows(specimen, settings, posed.material.density, *printing)
+    write_bill(folder / "bom.csv", rows)
     write_manifest(folder, specimen, posed, PROBLEM)
     return posed

@@ -11,7 +11,13 @@ import shapely
 
 from pipeline import problem
 from pipeline.fabrication.checks.package_check import page_words
-from pipeline.fabrication.papers import read_bill, write_assembly_sheet, write_bill, write_manifest
+from pipeline.fabrication.papers import (
+    bill_rows,
+    read_bill,
+    write_assembly_sheet,
+    write_bill,
+    write_manifest,
+)
 from pipeline.fabrication.papers.assembly_plan import _DIGIT, _NUMBER, OVERLAP, number_places, tiles
 from pipeline.fabrication.papers.pdf_paper import POINT, SIZES, room
 from pipeline.fabrication.parts import BuiltSpecimen
@@ -88,7 +94,8 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
         "laser/shims_01_nominal.dxf": ["S8.25"],
         "print/plate_01.3mf": ["A1", "B1"],
     }
-    write_bill(tmp_path / "bom.csv", specimen, ASKED, DENSITY, contents, PRINTS, 0.62)
+    rows = bill_rows(specimen, ASKED, DENSITY, contents, PRINTS, 0.62)
+    write_bill(tmp_path / "bom.csv", rows)
     found = read_bill(tmp_path / "bom.csv")
     units = [row["id"] for row in found if row["item"] == "unit"]
     assert units == [unit.label for unit in specimen.units]
