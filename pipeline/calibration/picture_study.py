@@ -13,7 +13,7 @@ from pipeline.problem.fields import csv_columns
 from pipeline.runtime import UserError
 from pipeline.tracking.detect import detect_lattice
 from pipeline.tracking.geometry import SpecimenOutlines
-from pipeline.tracking.motion import Patch, find_motion, fit_motion
+from pipeline.tracking.motion import Patch, follow_patch
 from sim.core import Floats, Image
 from sim.structure import Lattice
 
@@ -88,9 +88,7 @@ def _tracked(asked: RigidParts, folder: Path) -> xr.Dataset:
     for each in found:
         place = each.part, frames.index(each.frame)
         reference[place] = each.reference
-        start = find_motion(each.patch)
-        if start is not None:
-            measured[place] = fit_motion(each.patch, start, whole=True)
+        measured[place] = follow_patch(each.patch, whole=True)
     along = ("part", "frame", "dof")
     return xr.Dataset(
         {"reference": (along, reference), "measured": (along, measured)},

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets
+from pipeline.calibration import read_picture
 from pipeline.datasets import provenance
 from pipeline.runtime import PREFIX, UserError, cli, found_in, write_atomically
 from pipeline.tracking.frames import (
@@ -25,8 +26,13 @@ from pipeline.tracking.frames import (
     rendered,
 )
 from pipeline.tracking.frames import recording as recordings
-from pipeline.tracking.geometry import as_built, clamped_units, outlines_of_design
-from pipeline.tracking.motion import Track, track_video
+from pipeline.tracking.geometry import (
+    as_built,
+    clamped_units,
+    outlines_of_design,
+    rotation_matrix,
+)
+from pipeline.tracking.motion import Patch, Track, follow_patch, track_video
 from pipeline.tracking.output import assemble_track, dic_points, driven_units, write_track_table
 from pipeline.tracking.reference_frame import RecordingSetup, proposal
 
@@ -39,10 +45,13 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: a fault of the files, or a video that does not show the design.
     """
+    if args.words[0] == "pair":
+        _pair(*(Path(word) for word in args.words[1:]), args=args)
+        return
     *command, file = args.words
     known = {"": _track, "init": _init, "points": _points, "import": _import}
     if (name := " ".join(command)) not in known:
-        remedy = "give one of init, points, import, or a recording alone; see --help"
+        remedy = "give one of init, points, import, pair, or a recording alone; see --help"
         raise UserError("no such command", value=name, remedy=remedy)
     wanted = {"": "out", "points": "out", "init": "design"}.get(name)
     if wanted is not None and getattr(args, wanted) is None:
@@ -98,6 +107,34 @@ def _init(video: Path, args: argparse.Namespace) -> None:
     LOG.info("%s: %s, %.4g mm/px; see %s", out, seen, found.pixel_size, drawn)
     for doubt in found.doubts:
         LOG.info("not told: %s", doubt)
+
+
+def _pair(*pictures: Path, args: argparse.Namespace) -> None:
+    import cv2
+
+    if len(pictures) != 2 or args.out is None or len(args.at or []) % 2 or not args.at:
+        usage = "python -m pipeline track pair FIRST.png LATER.png --at X Y --out motions.csv"
+        raise UserError("two pictures, x and y of patches, and a file are wanted", remedy=usage)
+    before, after = (read_picture(path) for path in pictures)
+    centres, half = np.reshape(args.at, (-1, 2)), 0.5 * (args.side - 1)
+    drawn = cv2.cvtColor(after, cv2.COLOR_GRAY2BGR)
+    lines = ["x_px,y_px,u_px,v_px,rotation_deg"]
+    for centre in centres:
+        square = half * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+        motion = follow_patch(Patch(before, after, centre + square, centre))
+        motion[2] = np.rad2deg(motion[2])
+        lines.append(",".join("" if np.isnan(one) else f"{one:.6g}" for one in (*centre, *motion)))
+        if np.isnan(motion).any():
+            LOG.warning("warning: nothing like the patch at %g, %g is seen again", *centre)
+            continue
+        LOG.info("%g, %g moved by %.4f, %.4f px and turned by %.3f deg", *centre, *motion)
+        corners = centre + motion[:2] + square @ rotation_matrix(np.deg2rad(motion[2])).T
+        outline = np.round(16 * corners).astype(np.int32)
+        cv2.polylines(drawn, [outline], True, (0, 80, 230), 1, cv2.LINE_AA, 4)
+    with write_atomically(args.out) as aside:
+        aside.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with write_atomically(args.out.with_suffix(".png")) as aside:
+        aside.write_bytes(cv2.imencode(".png", drawn)[1].tobytes())
 
 
 def _import(path: Path, args: argparse.Namespace) -> None:

@@ -59,6 +59,17 @@ def find_motion(patch: Patch) -> Floats | None:
     return np.append(matrix[:, :2] @ patch.centre + matrix[:, 2] - patch.centre, turn)
 
 
+def follow_patch(patch: Patch, *, whole: bool = False) -> Floats:
+    """Finds shift and rotation (3,) unaided, however far they are; NaN if too little is seen.
+
+    Args:
+        patch: the patch.
+        whole: as of `fit_motion`.
+    """
+    start = find_motion(patch)
+    return np.full(3, np.nan) if start is None else fit_motion(patch, start, whole=whole)
+
+
 def fit_motion(patch: Patch, start: Floats, *, whole: bool = False) -> Floats:
     """Fits shift and rotation (3,) by correlation of the pixels; NaN where that fails.
 

@@ -38,6 +38,20 @@ def extended(recording: Path, line: str) -> None:
     recording.write_text(recording.read_text(encoding="utf-8") + line + "\n", encoding="utf-8")
 
 
+def test_patches_turned_by_170_degrees_are_found_by_a_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pictures = [str(CLIPS / f"dic/rotation_{turn}.png") for turn in ("000", "170")]
+    out, at = tmp_path / "motions.csv", ["256", "256", "200", "180"]
+    assert run_stage("track", ["pair", *pictures, "--at", *at, "--out", str(out)]) == 0
+    middle, other = np.loadtxt(out, delimiter=",", skiprows=1)[:, 2:]
+    np.testing.assert_allclose(middle, [0.0, 0.0, -170.0], atol=0.02)
+    np.testing.assert_allclose(other, [97.952, 160.569, -170.0], atol=0.02)
+    assert out.with_suffix(".png").exists()
+    assert run_stage("track", ["pair", *pictures, "--out", str(out)]) == 2
+    assert "--at X Y" in capsys.readouterr().err
+
+
 def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
     """With driven units, and a load cell on the clock of the file whatever the window."""
     path, log = recording.with_name("f_silhouette_design.nc"), recording.with_name("load.csv")
