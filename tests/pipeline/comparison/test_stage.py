@@ -62,6 +62,8 @@ def test_a_simulation_that_is_right_leaves_noise_alone(whole: xr.Dataset) -> Non
         np.testing.assert_allclose(found["rmse"], SIGMA, rtol=0.25)  # some of it by the drive
         np.testing.assert_allclose(found["noise_share"], 1.0, atol=0.4)
         assert (found["correlation"] > 0.99).all()
+    apart = whole["measured"] - whole["simulated"]
+    np.testing.assert_allclose(whole["residual"], apart, atol=1e-6)  # of single precision
     value, low, high = whole["rmse"].sel(side="simulated").transpose("estimate", "dof").values
     assert ((low < value) & (value < high)).all()
 

@@ -45,6 +45,7 @@ def test_the_band_holds_the_next_specimens(study: tuple[Problem, Path], samples:
     noise = SIGMA * np.random.default_rng(2).standard_normal(others.displacement.shape)
     measured = others.displacement + noise
     low, _, high = widen_band(band_limits(samples.displacement, 0.95), SIGMA, 0.95)
+    np.testing.assert_allclose(widen_band(np.zeros((3, 1)), np.array([2.0]), 0.95)[2], 3.92, 1e-4)
     free = np.ptp(samples.displacement[:, -1, :, 0], axis=0) > 0
     inside = ((measured >= low) & (measured <= high))[:, :, free].mean(axis=(1, 2))
     assert free.sum() == 14

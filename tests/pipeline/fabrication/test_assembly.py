@@ -25,6 +25,7 @@ from pipeline.fabrication.plates import PrintEstimate
 from sim.core import Floats
 from tests.pipeline.fabrication import handmade
 from tests.pipeline.fabrication.handmade import ASKED
+from tests.tables import refused
 
 DENSITY = 6.18e-9  # tonne/mm^2
 PROBLEM = Path(__file__).parents[3] / "experiments/fig2/problem.yaml"
@@ -47,6 +48,8 @@ def test_the_pages_name_every_unit_shim_and_fixture(tmp_path: Path) -> None:
     assert "shims: 8 pieces of 1 lengths" in shims[0]
     assert {"S8.25", "8.25 mm", "8.10 mm", "7", "1", "8"} <= set(shims)
     assert "Set the clamped units into their pads or grips: A1, C2." in " ".join(pages[0])
+    steps = [words for words in pages[0] if words.rstrip(".").isdigit()]
+    assert steps[1:] == [f"{number}." for number in range(1, 13)]  # after the page's own
 
 
 def test_two_kinds_of_shims_are_told_apart_by_ligament(tmp_path: Path) -> None:
@@ -89,6 +92,10 @@ PRINTS = {"print/plate_01.3mf": PrintEstimate(3900.0, 2000.0)}
 
 def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     specimen = handmade.specimen()
+    *others, last = specimen.units
+    slots = tuple(dataclasses.replace(slot, wall=0.7) for slot in last.slots)
+    thin = dataclasses.replace(last, slots=slots)
+    specimen = dataclasses.replace(specimen, units=(*others, thin))
     contents = {
         "laser/units_01_nominal.dxf": [unit.label for unit in specimen.units],
         "laser/shims_01_nominal.dxf": ["S8.25"],
@@ -101,7 +108,11 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     assert units == [unit.label for unit in specimen.units]
     first = found[0]
     assert first["note"] == "column 1 row 1; slots 3 3 mm deep; walls from 1.00 mm"
-    assert specimen.thin == {}
+    assert specimen.thin == {"C2": 0.7}
+    assert found[5]["note"].endswith("; walls from 0.70 mm (thin)")
+    (pin,) = (row for row in found if row["item"] == "pin")
+    none = "no room for a pin: the jig alone aligns: A1, B1, C1, A2, B2, C2"
+    assert pin["note"] == f"aligns 6 layers; {none}"
     assert first["files"] == "laser/units_01_nominal.dxf print/plate_01.3mf"
     area = specimen.units[0].design.area
     assert float(first["mass_g"]) == pytest.approx(area * 6.18e-3, abs=1e-4)  # kg/m^2 = mg/mm^2
@@ -131,6 +142,9 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     prints = found[-1]
     assert (prints["id"], prints["count"]) == ("prints", "1")
     assert float(prints["mass_g"]) == pytest.approx(2000 * np.pi / 4 * 1.75**2 * 1.24e-3, rel=1e-4)
+    (tmp_path / "bom.csv").write_bytes(b"item,id\nunit,\xff\n")
+    with refused("the bill of materials that was just written cannot be read back"):
+        read_bill(tmp_path / "bom.csv")
 
 
 def test_the_manifest_holds_parameters_and_hashes(tmp_path: Path) -> None:

@@ -38,8 +38,15 @@ def overlapping(folder: Path) -> None:
     design.to_netcdf(folder / "design.nc")
 
 
+def turned_inside_out(folder: Path) -> None:
+    design = built.design()
+    design["vertices"][1, 1] += [5.0, -14.0]
+    design.to_netcdf(folder / "design.nc")
+
+
 BROKEN: dict[str, tuple[Edit, list[str]]] = {
     "overlap": (overlapping, ["the units A1 and B1 overlap", "constraints.gap"]),
+    "inside out": (turned_inside_out, ["the outline of unit B1 crosses itself", "constraints"]),
     "cut short": (cut_short, ["design.nc"]),
 }
 MISTAKES = BROKEN | {
@@ -84,5 +91,5 @@ def test_a_mistake_is_told(folder: Path, capsys: pytest.CaptureFixture[str], nam
     assert not out.exists()
     assert not list(folder.glob("fabrication/.*"))
     picture = folder / "fabrication/cloaked_faults/fault_1.png"
-    assert picture.exists() == (name in {"overlap", "slot cuts through"})
+    assert picture.exists() == (name in {"overlap", "inside out", "slot cuts through"})
     assert picture.exists() == (picture.name in told)

@@ -112,10 +112,10 @@ def without_id(package: Path) -> None:
     write_stl(path, np.asarray(body.vertices), np.asarray(body.faces))
 
 
-def halved(name: str) -> Callable[[Path], None]:
+def halved(name: str, kept: float = 0.5) -> Callable[[Path], None]:
     def damage(package: Path) -> None:
         content = (package / name).read_bytes()
-        (package / name).write_bytes(content[: len(content) // 2])
+        (package / name).write_bytes(content[: int(kept * len(content))])
 
     return damage
 
@@ -142,6 +142,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "id twice": (edited(f"{UNITS}.dxf", "1000\nA1\n", "1000\nB1\n", -1), "unit A1: it is missing"),
     "layer": (edited(f"{UNITS}_r12.dxf", "CUT_OUTER", "CUT_OTHER", -1), "a layer of name"),
     "svg id": (edited(f"{UNITS}.svg", 'label="C2"', 'label="C9"'), "other parts, layers"),
+    "svg corner": (edited(f"{UNITS}.svg", '"A1" d="M', '"A1" d="M1'), "has another size or place"),
     "svg scale": (edited(f"{UNITS}.svg", 'width="600mm"', 'width="600cm"'), "the page does not"),
     "r12 missing": (gone(f"{UNITS}_r12.dxf"), "units_sheet1_nominal_r12.dxf"),
     "kerf missing": (gone(f"{KERF}*"), "there is no sheet of units for a kerf of 0.15 mm"),
@@ -165,6 +166,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
         "unit A1: it is not on the assembly sheet",
     ),
     "pdf cut short": (halved("assembly.pdf"), "the assembly sheet"),
+    "pdf without an end": (halved("assembly.pdf", 0.999), "it is not whole"),
     "pins": (edited("bom.csv", "pin,PIN1.5,12", "pin,PIN1.5,11"), "11 pins for 12 holes"),
 }
 

@@ -1,10 +1,19 @@
+from dataclasses import replace
+
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from shapely import STRtree, box
+from shapely import STRtree, affinity, box
 
+from pipeline.fabrication.fixtures import fixtures
+from pipeline.fabrication.fixtures.specimen_holders import adapter
 from pipeline.fabrication.parts import Layer, PrintedPart
 from pipeline.fabrication.plates import STRAND, TooLargeError, estimate_print, pack
+from pipeline.fabrication.plates.packing import Ground, spread
+from pipeline.problem.fields import SIM_UNITS
+from pipeline.problem.sections import Fabrication
+from tests.pipeline.fabrication import handmade
 
 SHEET, MARGIN, GAP = (100.0, 60.0), 5.0, 2.0
 lengths = st.floats(0.5, 50.0)
@@ -36,6 +45,35 @@ def test_equal_parts_keep_their_order_and_one_too_large_is_named() -> None:
 
 def block(side: float, height: float = 6.0) -> PrintedPart:
     return PrintedPart("A1", (Layer(box(0.0, 0.0, side, side), 0.0, height),))
+
+
+def test_every_part_is_spread_once() -> None:
+    parts = [block(20.0 + number) for number in range(20)]
+    sheets = list(spread(parts, Ground("sheet", "laser", SHEET, MARGIN, GAP), "problem.yaml"))
+    assert len(sheets) > 2
+    laid = [part.size for sheet in sheets for part, _, _ in sheet]
+    assert sorted(laid) == [part.size for part in parts]
+
+
+def test_an_adapter_holds_its_unit_and_touches_no_other() -> None:
+    """Seen as it is used: it is printed on its back."""
+    one = handmade.specimen()
+    unit = one.units[1]
+    fingers = adapter(unit, one, handmade.ASKED).layers[-1].area
+    placed = affinity.scale(fingers, xfact=-1.0, origin=(0.0, 0.0))
+    assert placed.area > 20.0
+    others = [other.outline for other in one.units if other is not unit]
+    assert placed.distance(shapely.union_all(others)) >= 1.4
+    assert placed.distance(unit.outline) == pytest.approx(handmade.ASKED.fixture.clearance)
+
+
+def test_bolts_of_a_grip_in_pieces_keep_off_their_ends() -> None:
+    """Four in a row 10 mm apart; the middle piece, of 15 mm, has room for the heads of none."""
+    held = replace(handmade.specimen(), clamped=("A1", "B1", "C1"))
+    given = {"print": {"bed": ["30 mm", "99 mm"]}, "fixture": {"bolt_pitch": "10 mm"}}
+    asked = Fabrication.model_validate(given, context=SIM_UNITS)
+    made = (part for part in fixtures(held, asked, handmade.SPACING) if "LID" in part.id)
+    assert [len(lid.layers[0].area.interiors) for lid in made] == [1, 0, 1]
 
 
 def test_infill_saves_what_is_far_from_top_and_bottom() -> None:

@@ -83,6 +83,8 @@ def test_slots_that_turn_bend_their_shims_others_leave_them_straight() -> None:
     net = network(built.design(), "cloaked")
     specimen = build_specimen(net, Fabrication(), ("toy", ""), DESIGN)
     assert max(ligament.strain for ligament in specimen.ligaments) < 1e-9
+    for made, drawn in zip(specimen.ligaments, handmade.specimen().ligaments, strict=True):
+        assert made.middle == pytest.approx(drawn.middle)
     assert specimen.bent == []
     # the corner of unit B1 that faces A1 is so sharp that its slot cannot follow the ligament
     design = sharpened()

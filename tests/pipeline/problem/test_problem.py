@@ -18,6 +18,7 @@ from pipeline.problem import (
     content_hash,
     from_canonical,
     interest_units,
+    outputs,
     section_hash,
 )
 from pipeline.problem.fields import SIM_UNITS
@@ -55,6 +56,8 @@ def test_fig2_is_as_the_authors_ran_it(fig2: Path) -> None:
     assert len(cloak_units(problem)) == 68
     assert len(interest_units(problem)) == 156
     assert 112 not in {*cloak_units(problem), *interest_units(problem)}
+    wave = load(ROOT / "experiments/fig7/problem.yaml")
+    assert ["verification" in outputs(each) for each in (problem, wave)] == [False, True]
 
 
 def test_presets_change_what_they_name(fig2: Path) -> None:

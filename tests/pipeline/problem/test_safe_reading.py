@@ -1,5 +1,6 @@
 """Files that were written to do harm, or that were never meant to be read here."""
 
+import os
 import subprocess
 import sys
 import tracemalloc
@@ -197,6 +198,9 @@ def test_a_file_is_read_up_to_its_bound_and_no_further(tmp_path: Path) -> None:
     assert read_bounded(path, 1000) == bytes(1000)
     with pytest.raises(OSError, match="1000 bytes, which is more than 999"):
         read_bounded(path, 999)
+    os.truncate(path, 1 << 30)
+    with refused("1073741824 bytes, which is more than 536870912"):
+        csv_columns.read_cells(path)
     problem = tmp_path / "problem.yaml"
     problem.write_text("# " + "a" * (256 << 10) + "\ntitle: a\n")
     with pytest.raises(UserError, match="bytes, which is more than 262144"):

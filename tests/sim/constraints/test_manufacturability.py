@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from sim import structure
 from sim.constraints import ConstraintVector, Limits, margins
 from sim.constraints.manufacturability import separation, void_angle
+from sim.constraints.slot_walls import slot_pairs
 from sim.core import Floats
 from sim.optimise import SqpOptions, minimise
 from tests.sim.structures import RING, central
@@ -101,6 +102,10 @@ def test_margins_are_those_of_the_geometry(
     found = margins(lattice, vertices, LIMITS)
     edges = np.linalg.norm(vertices[lattice.next_vertex] - vertices, axis=1)
     assert tuple(found)[-4:] == ("gap", "slot_angle", "slot_wall", "slot_gap")
+    first, second = lattice.unit[slot_pairs(lattice)[:, [1, 6]]].T
+    np.testing.assert_array_equal(first, second)
+    ends = np.bincount(lattice.ligament_units.ravel())
+    np.testing.assert_array_equal(np.bincount(first), ends * (ends - 1) // 2)
     assert found["edge_length"].value == pytest.approx(edges.min() - 5)
     angles = block_angles(lattice, vertices)
     assert found["block_angle"].value == pytest.approx(angles.min() - np.pi / 6)

@@ -197,6 +197,8 @@ def test_kicks_leave_a_poor_optimum_and_keep_the_best() -> None:
     assert kicked.loss < still.loss
     assert kicked.loss == min(e.loss for e in kicked.evaluations)
     assert kicked.evaluations[: len(still.evaluations)][-1].loss == still.evaluations[-1].loss
+    kick = kicked.evaluations[len(still.evaluations)].x - still.x
+    assert 0.0 < np.abs(kick).max() <= sim.SqpOptions().kick
 
 
 @pytest.mark.parametrize("method", ["sqp", "mma"])
