@@ -1,5 +1,3 @@
-"""Searches the documentation in headless Chromium, opened from disk."""
-
 import json
 import os
 import subprocess

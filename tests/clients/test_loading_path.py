@@ -1,5 +1,3 @@
-"""The page of a static study in headless Chromium: its figure, its loads, its colours."""
-
 from pathlib import Path
 
 import pytest

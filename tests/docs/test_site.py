@@ -1,5 +1,3 @@
-"""The documentation renders, links to nothing that is not there, and needs no network."""
-
 import os
 import re
 import runpy

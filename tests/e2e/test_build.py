@@ -1,5 +1,3 @@
-"""What a build leaves: readable logs, complete results, and nothing to be done."""
-
 import resource
 import shutil
 from pathlib import Path

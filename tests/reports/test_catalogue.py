@@ -1,5 +1,3 @@
-"""The one command of all reports, and the figures of the paper."""
-
 import inspect
 from importlib import import_module
 

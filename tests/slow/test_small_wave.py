@@ -1,5 +1,3 @@
-"""A small study of waves by the real stages: design, response, shorter steps, report."""
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""Every module can be imported, on each Python."""
-
 import importlib
 
 from pipeline.runtime import ROOT

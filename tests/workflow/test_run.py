@@ -1,5 +1,3 @@
-"""The workflow goes on after any kind of end."""
-
 import os
 import signal
 import subprocess

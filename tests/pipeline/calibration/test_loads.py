@@ -1,5 +1,3 @@
-"""Zeros of load cells, the cell of a track, and the cut-off of contact: found, or refused."""
-
 import shutil
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,3 @@
-"""Parts of real pictures are tracked as another program tracks them; a specimen is located."""
-
 from pathlib import Path
 
 import numpy as np

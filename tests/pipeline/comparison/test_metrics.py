@@ -1,5 +1,3 @@
-"""Metrics against what they must be, and how often their intervals hold the truth."""
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,5 +1,3 @@
-"""The stage on small studies whose tracks are known."""
-
 from collections.abc import Callable
 from pathlib import Path
 

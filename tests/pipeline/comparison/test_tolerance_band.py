@@ -1,5 +1,3 @@
-"""The band of predictions holds the specimens that it is drawn for."""
-
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""The assembly sheet, the bill of materials and the manifest."""
-
 import dataclasses
 import hashlib
 import json

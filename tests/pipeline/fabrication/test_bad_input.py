@@ -1,5 +1,3 @@
-"""Mistakes in a problem or a design: one message with what to change, nothing half written."""
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""Continuous strips end where a void begins; clamps are closed solids."""
-
 from dataclasses import replace
 
 import numpy as np

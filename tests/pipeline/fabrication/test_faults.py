@@ -1,5 +1,3 @@
-"""A fault stops an export in words that say what to do, with a picture of where it is."""
-
 from dataclasses import replace
 from pathlib import Path
 

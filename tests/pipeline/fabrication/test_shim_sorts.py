@@ -1,5 +1,3 @@
-"""Shims of nearly equal lengths are cut as one sort, and none is too long for its slots."""
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

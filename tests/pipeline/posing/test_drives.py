@@ -1,5 +1,3 @@
-"""Drives of a problem file: displacements, forces, moments and rotations, alone or together."""
-
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Units as beams: how soft they are against their ligaments."""
-
 import numpy as np
 import pytest
 

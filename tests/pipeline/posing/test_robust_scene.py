@@ -1,5 +1,3 @@
-"""Designs for more than one load, and for imperfect copies."""
-
 import json
 from copy import deepcopy
 from pathlib import Path

@@ -1,5 +1,3 @@
-"""Problems that have no meaning, designs that cannot be made: one message, with the place."""
-
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Every mistake in a problem file is told with its key, its value and a remedy."""
-
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,3 @@
-"""Several designs of one problem, each named by its number."""
-
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,3 @@
-"""Kagome lattices and lattices from files, through the same chain as squares."""
-
 from pathlib import Path
 
 import numpy as np

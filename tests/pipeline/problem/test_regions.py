@@ -1,5 +1,3 @@
-"""Shapes of voids: polygons, curves, formulas and images, with size, centre and orientation."""
-
 import math
 from collections.abc import Callable
 from pathlib import Path

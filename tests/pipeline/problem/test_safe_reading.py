@@ -1,5 +1,3 @@
-"""Files that were written to do harm, or that were never meant to be read here."""
-
 import os
 import subprocess
 import sys

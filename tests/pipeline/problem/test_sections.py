@@ -1,5 +1,3 @@
-"""Sections of a problem by themselves."""
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""Voids, inclusions and targets, from the problem file to the response."""
-
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Structures with their shims bent as the slots are drawn, from a problem to their response."""
-
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""The certificate of a design over a family of loads, from its problem file to its page."""
-
 from pathlib import Path
 
 import numpy as np

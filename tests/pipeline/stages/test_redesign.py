@@ -1,5 +1,3 @@
-"""A design by the angle law with contact on distance: kept where both agree, else optimised."""
-
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Modes, transmission and waves of a small study, and the page that shows them."""
-
 from pathlib import Path
 
 import numpy as np

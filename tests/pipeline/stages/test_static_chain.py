@@ -1,5 +1,3 @@
-"""A small void from its problem to its response, and a path that ends early."""
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""Kinds of specimens and of files, on small clips from the virtual lab."""
-
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction

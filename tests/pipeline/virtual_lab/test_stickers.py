@@ -1,5 +1,3 @@
-"""Sheets of marks are true to scale: read back from the PDF."""
-
 import base64
 import re
 import zlib

@@ -1,5 +1,3 @@
-"""New studies from the templates: valid as they are, and nothing half made."""
-
 import shutil
 from pathlib import Path
 

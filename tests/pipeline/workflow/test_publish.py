@@ -1,5 +1,3 @@
-"""A published study is a valid Workflow Run Crate that tells real from synthetic data."""
-
 import json
 import shutil
 from pathlib import Path

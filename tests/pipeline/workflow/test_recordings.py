@@ -1,5 +1,3 @@
-"""Which recordings the report of a study shows."""
-
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,3 @@
-"""The list of the paper's claims, and how they are judged."""
-
 from dataclasses import replace
 
 import pytest

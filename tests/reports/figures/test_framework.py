@@ -1,5 +1,3 @@
-"""Figure 1: the framework, drawn from the geometry of a study."""
-
 from pathlib import Path
 
 import pytest

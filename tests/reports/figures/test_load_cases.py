@@ -1,5 +1,3 @@
-"""Several load cases of a slow load: each with its row, its curve and its name."""
-
 from pathlib import Path
 
 import numpy as np

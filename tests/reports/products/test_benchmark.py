@@ -1,5 +1,3 @@
-"""The page on benchmarks, of points that were made up."""
-
 import csv
 import json
 from pathlib import Path

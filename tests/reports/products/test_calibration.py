@@ -1,5 +1,3 @@
-"""The figure of a calibration: sets, fits and constants, and whether they were measured."""
-
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Shows a problem before it is computed."""
-
 from collections.abc import Callable
 from pathlib import Path
 from string import Template

@@ -1,5 +1,3 @@
-"""The page of what is built, and the pictures on it."""
-
 import base64
 import io
 import json

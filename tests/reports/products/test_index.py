@@ -1,5 +1,3 @@
-"""The page over everything that was built."""
-
 import base64
 import shutil
 from collections.abc import Callable

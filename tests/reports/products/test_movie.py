@@ -1,5 +1,3 @@
-"""Movies: what stands where, in which colour, and the same bytes again."""
-
 from dataclasses import replace
 from pathlib import Path
 

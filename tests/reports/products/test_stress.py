@@ -1,5 +1,3 @@
-"""The page of the stress suite, from counts made by hand."""
-
 import csv
 import json
 from pathlib import Path

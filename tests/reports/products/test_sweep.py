@@ -1,5 +1,3 @@
-"""The page of a sweep over any parameters, of losses in closed form."""
-
 import csv
 from pathlib import Path
 

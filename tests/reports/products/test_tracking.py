@@ -1,5 +1,3 @@
-"""The overlay and the quality page of a track that is known."""
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,3 @@
-"""The page of the measured specimens tells who measured, and judges in numbers."""
-
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Recordings beside their simulation: figures, pages, numbers and the player's data."""
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""Losses over a family of loads, their derivatives, and the design whose worst is lowest."""
-
 from collections.abc import Callable
 from pathlib import Path
 

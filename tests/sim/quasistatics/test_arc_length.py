@@ -1,5 +1,3 @@
-"""Paths beyond their limit points."""
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq

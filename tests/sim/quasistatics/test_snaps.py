@@ -1,5 +1,3 @@
-"""Paths that end: where, and in which state the structure comes to rest after it."""
-
 from dataclasses import replace
 
 import numpy as np

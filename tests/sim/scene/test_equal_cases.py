@@ -1,5 +1,3 @@
-"""Load cases that are turned copies of one another, and what makes them none."""
-
 import tracemalloc
 from dataclasses import replace
 from typing import Any

@@ -1,5 +1,3 @@
-"""Designs that keep away from snaps, and spare their foil."""
-
 from functools import cache
 
 import jax.numpy as jnp

@@ -1,5 +1,3 @@
-"""What a plan decides, and that what it skips changes nothing."""
-
 import json
 from dataclasses import replace
 from typing import Any

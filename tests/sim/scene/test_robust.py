@@ -1,5 +1,3 @@
-"""Losses that are combined over loads and averaged over imperfect copies."""
-
 import jax
 import jax.numpy as jnp
 import numpy as np

@@ -1,5 +1,3 @@
-"""The common interface of the solvers: cases, threads, types, held units."""
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,5 +1,3 @@
-"""Many cases in one call: in order, failures with their reason, memory flat."""
-
 from collections.abc import Iterator
 
 import numpy as np
