@@ -65,7 +65,6 @@ class Job:
 
     @property
     def rule(self) -> str:
-        """The rule that it is of."""
         return re.sub("^rule_|_wildcards_.*$", "", self.comment)
 
 

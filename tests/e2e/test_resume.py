@@ -77,12 +77,10 @@ def press_ctrl_c(run: Run, checkout: Checkout) -> None:
 
 
 def evaluated(count: int) -> Moment:
-    """More than so many evaluations are kept."""
     return lambda checkout: len(journal(checkout, "sqp")) > count
 
 
 def there_is(*patterns: str) -> Moment:
-    """There is such a file among the results."""
     return lambda checkout: any(list(checkout.results.glob(pattern)) for pattern in patterns)
 
 

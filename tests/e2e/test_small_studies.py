@@ -41,14 +41,12 @@ HIDDEN = Small("fig5", start=0.4209155415, end=0.08393655071)
 
 @pytest.fixture(scope="module", params=[SPARED, HIDDEN], ids=lambda small: small.study)
 def small(request: pytest.FixtureRequest) -> Small:
-    """One of the studies."""
     chosen: Small = request.param
     return chosen
 
 
 @pytest.fixture(scope="module")
 def built(small: Small, tmp_path_factory: pytest.TempPathFactory) -> Built:
-    """What the stages make of it."""
     folder = tmp_path_factory.mktemp(small.study)
     whole = yaml.safe_load((ROOT / f"experiments/{small.study}/problem.yaml").read_text())
     draft = whole.pop("presets")["quick"]

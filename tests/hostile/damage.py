@@ -30,7 +30,6 @@ def _turn_bits(content: bytes, random: Random, count: int) -> bytes:
 
 
 def _in_part(change: Callable[[bytes, Random], bytes]) -> Damage:
-    """Changes a part of a file."""
 
     def changed(content: bytes, random: Random) -> bytes:
         start = random.randrange(len(content))

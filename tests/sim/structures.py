@@ -73,7 +73,6 @@ def some_ligaments(net: NetworkArrays, which: Ints) -> NetworkArrays:
 
 
 def dense(of: Matrix) -> Floats:
-    """All entries of a stored matrix."""
     if not of.pattern.by_fronts:
         n, width = of.pattern.size
         lower = of.values.reshape(n, width + 1)
@@ -178,7 +177,6 @@ class Rig:
 
     @property
     def numbers(self) -> Numbers:
-        """The initial structure."""
         return Numbers(
             design=jnp.zeros(self.space.n_variables),
             stiffness=jnp.ones((self.lattice.n_ligaments, 3)),

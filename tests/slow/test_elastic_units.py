@@ -156,7 +156,6 @@ def loss_of(cloak: Cloak, stiffness: Floats) -> float:
 
 @pytest.fixture(scope="module")
 def losses(cloak: Cloak) -> tuple[float, float]:
-    """Losses with rigid and with elastic units."""
     ligaments, (rigid, others) = joined(cloak), split(cloak)
     with_units = ligaments + la.block_diag(*unit_stiffnesses(cloak))
     between = others.T @ with_units @ rigid

@@ -68,12 +68,10 @@ def written(folder: Path, described: dict[str, Any]) -> Path:
 
 
 def loaded(folder: Path, described: dict[str, Any]) -> Calibration:
-    """The calibration as it is read."""
     return load_section(written(folder, described), Calibration)
 
 
 def synthesised(folder: Path, text: dict[str, object]) -> Path:
-    """The calibration of computed files."""
     source = written(folder, text)
     done = ["synthesise", str(source), "--out-dir", str(folder / "data"), "--quiet"]
     assert run_stage("calibrate", done) == 0

@@ -42,7 +42,6 @@ def words(study: list[str], options: list[str], folder: Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def folder(study: list[str], film: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where that film was compared."""
     made = tmp_path_factory.mktemp("whole")
     assert run_stage("compare", words(study, written(film, made), made)) == 0
     return made
@@ -50,7 +49,6 @@ def folder(study: list[str], film: xr.Dataset, tmp_path_factory: pytest.TempPath
 
 @pytest.fixture
 def whole(folder: Path) -> xr.Dataset:
-    """Its comparison."""
     return datasets.read(folder / "comparison.nc", "comparison")
 
 

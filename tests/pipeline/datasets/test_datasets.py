@@ -30,7 +30,6 @@ def names(folder: Path) -> list[str]:
 
 @pytest.fixture
 def sweep(tmp_path: Path) -> Path:
-    """A good sweep dataset on disk."""
     path = tmp_path / "sweep.nc"
     write(sample("sweep"), path, "sweep", ORIGIN)
     return path

@@ -27,7 +27,6 @@ def rectangle(
 
 
 def stroke(points: Sequence[tuple[float, float]], part: str, layer: str = "ENGRAVE") -> Curve:
-    """An open line."""
     return Curve(part, layer, "LWPOLYLINE", np.array(points, dtype=float), closed=False)
 
 
@@ -52,7 +51,6 @@ def write_dxf(
     colours: Mapping[str, int] | None = None,
     version: str = "R2010",
 ) -> Path:
-    """A DXF with these curves."""
     document = new(version)
     document.header["$INSUNITS"] = units
     document.appids.add("METACLOAK")
@@ -98,7 +96,6 @@ def write_svg(
 
 
 def write_stl(path: Path, vertices: Floats, triangles: Ints) -> Path:
-    """A binary STL."""
     Trimesh(vertices, triangles, process=False).export(path)
     return path
 

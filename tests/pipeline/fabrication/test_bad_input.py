@@ -15,7 +15,6 @@ Edit = Callable[[Path], None]
 
 
 def parameters(**values: object) -> Edit:
-    """A section `fabrication` of the problem file."""
 
     def edit(folder: Path) -> None:
         path = folder / "problem.yaml"

@@ -80,7 +80,6 @@ def check(package: Path, asked: Problem) -> None:
 
 
 def edited(name: str, before: str, after: str, count: int = 1) -> Callable[[Path], None]:
-    """Replaces text in a file."""
 
     def damage(package: Path) -> None:
         text = (package / name).read_text(encoding="utf-8")

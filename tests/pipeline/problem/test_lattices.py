@@ -72,7 +72,6 @@ def from_file(folder: Path, name: str) -> Path:
 
 
 def run(problem: Path) -> tuple[xr.Dataset, xr.Dataset]:
-    """Design and response of a problem, through the stages."""
     chosen, moved = designed(problem), problem.with_name("r.nc")
     study = ["--problem", str(problem), "--quiet", "--out", str(moved)]
     assert run_stage("simulate", [*study, "--design", str(chosen)]) == 0

@@ -10,7 +10,6 @@ from pipeline.runtime.progress import Progress
 
 @pytest.fixture
 def lines(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
-    """The lines told so far."""
     caplog.set_level(logging.INFO, "pipeline.runtime.progress")
     return lambda: [record.getMessage() for record in caplog.records]
 

@@ -77,7 +77,6 @@ def client(folder: Path, *words: str) -> subprocess.Popen[str]:
 
 
 def sleeping(folder: Path) -> psutil.Process:
-    """Waits until the stage sleeps."""
     process = folder / "process"
     deadline = time.monotonic() + 30
     while not process.exists() or not process.read_text():

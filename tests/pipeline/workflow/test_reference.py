@@ -63,7 +63,6 @@ def content(fig2: Path) -> Problem:
 
 @pytest.fixture(scope="module")
 def validator() -> jsonschema.Draft202012Validator:
-    """A validator of problem files."""
     jsonschema.Draft202012Validator.check_schema(problem_schema.schema())
     return jsonschema.Draft202012Validator(problem_schema.schema())
 

@@ -105,7 +105,6 @@ def test_page_shows_paper_and_ours(html: str, quick: StudyResults, quick_report:
 
 
 def page_of(study: StudyResults, **changes: object) -> str:
-    """The page of a study whose problem is changed."""
     problem = study.problem.model_copy(update=changes)
     return rendered(study_report(dataclasses.replace(study, problem=problem)), {})
 

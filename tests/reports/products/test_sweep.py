@@ -40,7 +40,6 @@ def found(setting: dict[str, str]) -> SweepResult:
 
 
 def paths(folder: Path, text: str) -> tuple[Path, Path]:
-    """The problem and its dataset."""
     folder.mkdir(parents=True, exist_ok=True)
     at = static.write(folder, static.HOLE + text, size=5)
     asked = problem.load(at)
@@ -53,7 +52,6 @@ def paths(folder: Path, text: str) -> tuple[Path, Path]:
 
 
 def drawn(folder: Path, text: str) -> Path:
-    """The folder of the page."""
     at, data = paths(folder, text)
     out = folder / "sweep"
     words = ["--problem", str(at), "--sweep", str(data), "--out-dir", str(out)]

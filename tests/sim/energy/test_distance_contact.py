@@ -113,7 +113,6 @@ PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 
 
 def definition(motion: Numbers, parts: Differentiable) -> Array:
-    """Energy of all pairs."""
     law = DistanceLaw(jnp.mean(parts.stiffness) * parts.scale, REACH)
     units = UnitOutline(jnp.asarray(parts.centroid), jnp.asarray(parts.corner).reshape(4, -1, 2))
     motions = jnp.asarray(motion).reshape(-1, 3)

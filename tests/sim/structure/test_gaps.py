@@ -13,7 +13,6 @@ def lattice() -> sim.Lattice:
 
 
 def all_pairs(lattice: sim.Lattice, vertices: np.ndarray) -> tuple[dict, list]:
-    """Distances and overlaps of all pairs, one by one."""
     units = [shapely.Polygon(vertices[lattice.unit == unit]) for unit in range(lattice.n_units)]
     pairs = [(a, b) for a in range(len(units)) for b in range(a + 1, len(units))]
     distances = {(a, b): units[a].distance(units[b]) for a, b in pairs}
