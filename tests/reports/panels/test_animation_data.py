@@ -99,33 +99,29 @@ def test_polygons_are_whole(study: StudyResults) -> None:
 
 SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
 TRIANGLE = np.array([[10.0, 0.0], [13.0, 0.0], [10.0, 3.0], [np.nan, np.nan]])
+PAIR = RigidUnits(
+    vertices=np.stack([SQUARE, TRIANGLE]),
+    site=np.array([[1.0, 1.0], [11.0, 1.0]]),
+    ligament_unit=np.array([[0, 1]]),
+    ligament_vertex=np.array([[1, 0]]),
+    region=np.array([rigid_units.SURROUNDINGS, rigid_units.CLOAK]),
+    support=np.array([rigid_units.CLAMPED, rigid_units.FREE]),
+)
 
 
-@pytest.fixture
-def pair() -> RigidUnits:
-    return RigidUnits(
-        vertices=np.stack([SQUARE, TRIANGLE]),
-        site=np.array([[1.0, 1.0], [11.0, 1.0]]),
-        ligament_unit=np.array([[0, 1]]),
-        ligament_vertex=np.array([[1, 0]]),
-        region=np.array([rigid_units.SURROUNDINGS, rigid_units.CLOAK]),
-        support=np.array([rigid_units.CLAMPED, rigid_units.FREE]),
-    )
-
-
-def test_a_unit_turns_about_its_centroid(pair: RigidUnits) -> None:
+def test_a_unit_turns_about_its_centroid() -> None:
     displacement = np.array([[0.5, -0.25, np.pi / 2], [0.0, 0.0, 0.0]])
-    np.testing.assert_allclose(pair.centroid, [[1, 1], [11, 1]], atol=1e-12)
-    moved = rigid_units.deformed(pair, displacement)
+    np.testing.assert_allclose(PAIR.centroid, [[1, 1], [11, 1]], atol=1e-12)
+    moved = rigid_units.deformed(PAIR, displacement)
     there = [[2.5, -0.25], [2.5, 1.75], [0.5, 1.75], [0.5, -0.25]]
     np.testing.assert_allclose(moved[0], there, atol=1e-12)
     np.testing.assert_array_equal(moved[1], TRIANGLE)
 
 
-def test_absent_units_are_not_drawn_and_values_follow(pair: RigidUnits) -> None:
-    vertices = pair.vertices.copy()
+def test_absent_units_are_not_drawn_and_values_follow() -> None:
+    vertices = PAIR.vertices.copy()
     vertices[0] = np.nan
-    holed = dataclasses.replace(pair, vertices=vertices)
+    holed = dataclasses.replace(PAIR, vertices=vertices)
     axes = style.place(style.page(50.0), 5, 5, 40, 40)
     shades: dict[str, Any] = {"colour_map": style.MAGNITUDE, "norm": Normalize(0, 2)}
     drawn = panels.draw(axes, holed, values=np.array([1.0, 2.0]), **shades)

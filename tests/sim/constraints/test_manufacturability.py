@@ -20,32 +20,20 @@ ROOM = structure.SlotRoom(grip=1.0, depth=5.0, width=0.45, wall=0.8, tip=0.1)
 LIMITS = Limits(
     edge_length=5.0, block_angle=np.pi / 6, convex=True, void_angle=0.0, gap=0.2, slots=ROOM
 )
+LATTICE = structure.quads(5, 5, 15.0, 2.25, np.deg2rad(20))
+SPACE = structure.design_space(LATTICE, RING, np.array([12]))
+CONSTRAINTS = ConstraintVector(SPACE, LIMITS)
 
 
-@pytest.fixture(scope="module")
-def lattice() -> structure.Lattice:
-    return structure.quads(5, 5, 15.0, 2.25, np.deg2rad(20))
-
-
-@pytest.fixture(scope="module")
-def space(lattice: structure.Lattice) -> structure.DesignSpace:
-    return structure.design_space(lattice, RING, np.array([12]))
-
-
-@pytest.fixture(scope="module")
-def constraints(space: structure.DesignSpace) -> ConstraintVector:
-    return ConstraintVector(space, LIMITS)
-
-
-def random_design(space: structure.DesignSpace, size: float, seed: int = 0) -> np.ndarray:
+def random_design(size: float, seed: int = 0, space: structure.DesignSpace = SPACE) -> Floats:
     return np.random.default_rng(seed).uniform(-size, size, space.n_variables)
 
 
 @pytest.mark.parametrize("symmetry", ["none", "C4"])
-def test_jacobian_by_definition(lattice: structure.Lattice, symmetry: structure.Symmetry) -> None:
-    space = structure.design_space(lattice, RING, np.array([12]), symmetry)
+def test_jacobian_by_definition(symmetry: structure.Symmetry) -> None:
+    space = structure.design_space(LATTICE, RING, np.array([12]), symmetry)
     constraints = ConstraintVector(space, replace(LIMITS, slots=None))
-    design = random_design(space, 0.8)
+    design = random_design(0.8, space=space)
 
     def plain(x: jax.Array) -> jax.Array:
         vertices = space.vertices(x)
@@ -58,28 +46,24 @@ def test_jacobian_by_definition(lattice: structure.Lattice, symmetry: structure.
     np.testing.assert_allclose(jacobian.toarray(), jax.jit(jax.jacobian(plain))(design), atol=1e-12)
 
 
-def test_jacobian_by_difference(
-    space: structure.DesignSpace, constraints: ConstraintVector
-) -> None:
-    design, way = random_design(space, 0.8), random_design(space, 1.0, seed=1)
-    slope = central(lambda step: constraints.values(design + step * way), 1e-6)
-    np.testing.assert_allclose(constraints(design)[1] @ way, slope, atol=1e-7)
+def test_jacobian_by_difference() -> None:
+    design, way = random_design(0.8), random_design(1.0, seed=1)
+    slope = central(lambda step: CONSTRAINTS.values(design + step * way), 1e-6)
+    np.testing.assert_allclose(CONSTRAINTS(design)[1] @ way, slope, atol=1e-7)
 
 
-def test_only_places_that_the_design_can_change_are_constrained(
-    lattice: structure.Lattice, space: structure.DesignSpace, constraints: ConstraintVector
-) -> None:
-    _, jacobian = constraints(random_design(space, 0.5))
-    free = np.isin(np.arange(lattice.n_vertices), space.free_vertices)
-    touched = free | free[lattice.next_vertex]
-    assert len(constraints.kinds[0].places) == touched.sum() < lattice.n_vertices
+def test_only_places_that_the_design_can_change_are_constrained() -> None:
+    _, jacobian = CONSTRAINTS(random_design(0.5))
+    free = np.isin(np.arange(LATTICE.n_vertices), SPACE.free_vertices)
+    touched = free | free[LATTICE.next_vertex]
+    assert len(CONSTRAINTS.kinds[0].places) == touched.sum() < LATTICE.n_vertices
     rows = np.asarray(abs(jacobian).sum(axis=1)).ravel()
-    edges = slice(0, len(constraints.kinds[0].places))
+    edges = slice(0, len(CONSTRAINTS.kinds[0].places))
     assert (rows[edges] > 0).all()
 
 
-def test_every_corner_is_constrained_even_without_a_ligament(lattice: structure.Lattice) -> None:
-    space = structure.design_space(lattice, np.array([0]))
+def test_every_corner_is_constrained_even_without_a_ligament() -> None:
+    space = structure.design_space(LATTICE, np.array([0]))
     corners = ConstraintVector(space, Limits(block_angle=0.5)).kinds[0].places
     assert set(range(4)) <= set(corners[:, 1])
 
@@ -93,36 +77,34 @@ def block_angles(lattice: structure.Lattice, vertices: Floats) -> Floats:
     return np.asarray(np.mod(np.angle(preceding / following), 2 * np.pi))
 
 
-def test_margins_are_those_of_the_geometry(
-    lattice: structure.Lattice, space: structure.DesignSpace, constraints: ConstraintVector
-) -> None:
-    design = random_design(space, 1.0)
-    vertices = constraints.vertices(design)
-    np.testing.assert_allclose(vertices, space.vertices(jnp.asarray(design)), atol=1e-13)
-    found = margins(lattice, vertices, LIMITS)
-    edges = np.linalg.norm(vertices[lattice.next_vertex] - vertices, axis=1)
+def test_margins_are_those_of_the_geometry() -> None:
+    design = random_design(1.0)
+    vertices = CONSTRAINTS.vertices(design)
+    np.testing.assert_allclose(vertices, SPACE.vertices(jnp.asarray(design)), atol=1e-13)
+    found = margins(LATTICE, vertices, LIMITS)
+    edges = np.linalg.norm(vertices[LATTICE.next_vertex] - vertices, axis=1)
     assert tuple(found)[-4:] == ("gap", "slot_angle", "slot_wall", "slot_gap")
     first, second = lattice.unit[slot_pairs(lattice)[:, [1, 6]]].T
     np.testing.assert_array_equal(first, second)
     ends = np.bincount(lattice.ligament_units.ravel())
     np.testing.assert_array_equal(np.bincount(first), ends * (ends - 1) // 2)
     assert found["edge_length"].value == pytest.approx(edges.min() - 5)
-    angles = block_angles(lattice, vertices)
+    angles = block_angles(LATTICE, vertices)
     assert found["block_angle"].value == pytest.approx(angles.min() - np.pi / 6)
     assert found["convexity"].value == pytest.approx(np.pi - angles.max())
     assert found["void_angle"].value == pytest.approx(
-        float(structure.void_angles(lattice, vertices).min())
+        float(structure.void_angles(LATTICE, vertices).min())
     )
     assert found["gap"].value == pytest.approx(
-        structure.smallest_gap(lattice, vertices).distance - 0.2
+        structure.smallest_gap(LATTICE, vertices).distance - 0.2
     )
 
 
-def test_the_worst_unit_is_named(lattice: structure.Lattice) -> None:
-    vertices = lattice.vertices.copy()
+def test_the_worst_unit_is_named() -> None:
+    vertices = LATTICE.vertices.copy()
     unit = 3 + 5 * 2
     vertices[4 * unit] = vertices[4 * unit + 1] + [0.5, -0.5]
-    worst = margins(lattice, vertices, Limits(edge_length=5.0))["edge_length"]
+    worst = margins(LATTICE, vertices, Limits(edge_length=5.0))["edge_length"]
     assert worst.units == (unit,)
     assert worst.value == pytest.approx(np.hypot(0.5, 0.5) - 5.0)
     assert "unit (3, 2)" in worst.where
@@ -137,12 +119,10 @@ def test_void_angles_unwrap_from_minus_45_to_315_degrees(degrees: float) -> None
     assert np.isfinite(slope).all()
 
 
-def test_block_and_void_angles_close_the_circle_for_any_design(
-    lattice: structure.Lattice, space: structure.DesignSpace, constraints: ConstraintVector
-) -> None:
-    vertices = constraints.vertices(random_design(space, 2.0))
-    around = structure.void_angles(lattice, vertices).sum(axis=1)
-    blocks = block_angles(lattice, vertices)[lattice.ligaments].sum(axis=1)
+def test_block_and_void_angles_close_the_circle_for_any_design() -> None:
+    vertices = CONSTRAINTS.vertices(random_design(2.0))
+    around = structure.void_angles(LATTICE, vertices).sum(axis=1)
+    blocks = block_angles(LATTICE, vertices)[LATTICE.ligaments].sum(axis=1)
     np.testing.assert_allclose(around + blocks, 2 * np.pi, atol=1e-12)
 
 
@@ -206,7 +186,7 @@ def test_separation_is_on_the_safe_side_and_ignores_padding() -> None:
     assert np.isfinite(jax.grad(separation)(jnp.asarray(padded))).all()
 
 
-def test_no_requirement_means_no_constraint(space: structure.DesignSpace) -> None:
-    values, jacobian = ConstraintVector(space, Limits())(np.zeros(space.n_variables))
+def test_no_requirement_means_no_constraint() -> None:
+    values, jacobian = ConstraintVector(SPACE, Limits())(np.zeros(SPACE.n_variables))
     assert values.shape == (0,)
-    assert jacobian.shape == (0, space.n_variables)
+    assert jacobian.shape == (0, SPACE.n_variables)
