@@ -48,7 +48,7 @@ def test_any_room_of_sim_switches_to_float64() -> None:
     assert run(script, *rooms) == ""
 
 
-def test_the_example_lowers_its_loss() -> None:
+def test_the_example_lowers_its_loss_and_needs_sim_alone() -> None:
     """As it is printed in docs/."""
     told = run(EXAMPLE.read_text())
     # the plan above names an allowed loss error, too
@@ -57,9 +57,6 @@ def test_the_example_lowers_its_loss() -> None:
     assert after == pytest.approx(0.0023, abs=2e-4)
     force = float(re.findall(r"drive (\d\.\d+) N", told)[0])
     assert force == pytest.approx(3.759, abs=2e-3)
-
-
-def test_the_example_is_short_and_needs_sim_alone() -> None:
     text = EXAMPLE.read_text()
     code = [line for line in text.splitlines() if line.strip()]
     assert len(code) <= 40

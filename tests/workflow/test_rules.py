@@ -45,15 +45,12 @@ def test_studies_from_nothing(sandbox: Sandbox) -> None:
     assert sandbox.planned("index") == {"index": 1}
 
 
-def test_a_design_by_the_angle_law_is_made_again(sandbox: Sandbox) -> None:
+def test_datasets_and_designs_are_those_that_the_problem_asks_for(sandbox: Sandbox) -> None:
     problem = sandbox.root / "experiments/fig5/problem.yaml"
     problem.write_text(problem.read_text().replace("law: geometric", "law: angle"))
     planned = sandbox.planned("fig5@quick")
     assert planned["simulate"] == 2  # by the angle law, then with contact on distance
     assert planned["redesign"] == 1
-
-
-def test_datasets_are_those_that_the_problem_asks_for(sandbox: Sandbox) -> None:
     before, _, rest = sandbox.problem.read_text().partition("\nsweep:\n")
     rest = rest[rest.index("report:") :]
     sandbox.problem.write_text(f"{before}\nrobustness:\n  samples: 5\n\n{rest}")

@@ -112,12 +112,7 @@ def test_loads_beyond_have_no_time_others_are_refused() -> None:
         find_load_time(np.linspace(0.0, 1.0, 30), SampledMotion(TIMES, np.sin(TIMES * 4)[:, None]))
 
 
-def test_the_direction_of_a_drive_is_told() -> None:
-    line = np.linspace(0, 5, 9)[:, None]
-    assert drive_turn(line * [np.cos(0.1), np.sin(0.1)], line * [1.0, 0.0]) == pytest.approx(0.1)
-
-
-def test_branches_follow_a_load_that_rests_and_grows_again() -> None:
+def test_branches_follow_the_direction_of_a_load() -> None:
     held = np.concatenate([np.zeros(20), np.linspace(0, 9, 40), np.full(20, 9.0)])
     assert (find_branches(held) == LOADING).all()
     up, rest = np.linspace(0.0, 1.0, 100), np.ones(40)
@@ -125,6 +120,8 @@ def test_branches_follow_a_load_that_rests_and_grows_again() -> None:
     assert (found[10:130] == LOADING).all()
     assert (found[150:230] == UNLOADING).all()
     assert (found[250:330] == LOADING).all()
+    line = np.linspace(0, 5, 9)[:, None]
+    assert drive_turn(line * [np.cos(0.1), np.sin(0.1)], line * [1.0, 0.0]) == pytest.approx(0.1)
 
 
 GRID = 15.0 * np.stack(np.meshgrid(np.arange(7.0), np.arange(7.0)), axis=-1).reshape(-1, 2)

@@ -33,7 +33,7 @@ def moved(scene: Scene) -> np.ndarray:
     return np.asarray(simulate(scene, vertices=scene.lattice.vertices).displacement[0])
 
 
-def test_a_force_is_shared_by_the_units_and_leaves_them_free_sideways(tmp_path: Path) -> None:
+def test_a_force_is_shared_by_units_and_a_moment_turns_one(tmp_path: Path) -> None:
     scene = posed(tmp_path, f"drive: {PUSH}")
     (case,) = scene.loads.cases
     forces = case.forces(np.array([0.5, 1.0]))
@@ -45,9 +45,6 @@ def test_a_force_is_shared_by_the_units_and_leaves_them_free_sideways(tmp_path: 
     assert np.abs(end[:, 1]).max() > 1e-3
     np.testing.assert_array_equal(end[:, 2], 0.0)
     np.testing.assert_allclose(response.drive_force[0, :, 0], -0.125 * np.arange(1, 5))
-
-
-def test_a_moment_and_the_rotation_that_it_makes(tmp_path: Path) -> None:
     turned = posed(tmp_path, f"drive: {TURN}")
     np.testing.assert_allclose(moved(turned)[-1, 2], [0.0, 0.0, np.deg2rad(10.0)])
     seen = simulate(turned, vertices=turned.lattice.vertices).observables[0]

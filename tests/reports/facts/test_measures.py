@@ -9,21 +9,18 @@ from reports.study import CLOAK, StudyResults, from_dataset
 from tests.reports import shaken_study
 
 
-def test_magnitude_mixes_lengths_and_angles_without_units() -> None:
+def test_magnitudes_and_their_mean_over_the_window() -> None:
     motion = xr.DataArray([[3.0, 4.0, 0.0], [15.0, 0.0, 1.0]], dims=("unit", "dof"))
     motion = motion.assign_coords(dof=["ux", "uy", "theta"])
     found = measures.magnitude(motion, np.array([15.0, 15.0, 1.0]))
     np.testing.assert_allclose(found, [5.0 / 15.0, np.sqrt(2.0)])
-
-
-def test_mean_magnitude_is_the_trapezoid_mean_over_the_window() -> None:
     time = np.array([0.0, 1.0, 2.0, 3.0])
-    motion = np.zeros((1, 1, 4, 2, 3))
-    motion[0, 0, :, 0, 0] = [0.0, 15.0, 30.0, 900.0]  # in the region
-    motion[0, 0, :, 1, 0] = 1e6  # outside it
+    window = np.zeros((1, 1, 4, 2, 3))
+    window[0, 0, :, 0, 0] = [0.0, 15.0, 30.0, 900.0]  # in the region
+    window[0, 0, :, 1, 0] = 1e6  # outside it
     response = xr.Dataset(
         {
-            "displacement": (("structure", "case", "time", "unit", "dof"), motion),
+            "displacement": (("structure", "case", "time", "unit", "dof"), window),
             "roi": ("unit", [1, 0]),
         },
         {"structure": ["altered"], "time": time, "dof": ["ux", "uy", "theta"]},
@@ -32,8 +29,8 @@ def test_mean_magnitude_is_the_trapezoid_mean_over_the_window() -> None:
     class Scaled:
         scale = np.array([15.0, 15.0, 1.0])
 
-    found = measures.mean_magnitude(response, Scaled, 2.0)  # type: ignore[arg-type]
-    assert found.item() == pytest.approx((0.5 * 0 + 1 + 0.5 * 2) / 2)
+    mean = measures.mean_magnitude(response, Scaled, 2.0)  # type: ignore[arg-type]
+    assert mean.item() == pytest.approx((0.5 * 0 + 1 + 0.5 * 2) / 2)
 
 
 def test_reduction_is_what_the_motion_was_scaled_by(study: StudyResults) -> None:

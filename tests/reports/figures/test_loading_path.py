@@ -88,9 +88,7 @@ def test_mimicking_error_by_hand(smile: StudyResults) -> None:
     assert measures.measure_of(smile.problem).of(smile.response).sel(structure="intact").max() == 0
 
 
-def test_contraction_of_seven_middle_columns_and_force_on_driven_units(
-    smile: StudyResults,
-) -> None:
+def test_contraction_of_middle_columns_and_force_on_units(smile: StudyResults) -> None:
     waist = np.mean([np.sin(np.pi * i / 14) for i in range(4, 11)])
     found = measures.contraction(smile.problem, smile.response).isel(case=0, time=-1)
     for name, pull in compressed_study.DRAW.items():
@@ -236,7 +234,7 @@ def test_a_second_design_is_drawn_and_a_kept_one_not(shield: StudyResults) -> No
     assert "Cloaked, no overlap" not in lines
 
 
-def test_a_jump_is_marked_and_counted(shield: StudyResults) -> None:
+def test_a_jump_is_marked_and_a_snap_is_a_headline(shield: StudyResults) -> None:
     response = shield.response.copy(deep=True)
     response["stability"][1, 0, 4] = checks.JUMPED
     jumped = changed(shield, "response", response)
@@ -248,9 +246,6 @@ def test_a_jump_is_marked_and_counted(shield: StudyResults) -> None:
     np.testing.assert_allclose(points, [[7.5, 0.1 * values(shield)["rotation_altered"].value / 2]])
     assert "crosses mark jumps" in figure.loading_path_figure(jumped).caption
     assert "crosses" not in figure.loading_path_figure(shield).caption
-
-
-def test_a_snap_is_a_headline_with_the_losses_of_both_branches(shield: StudyResults) -> None:
     assert "snaps" not in values(shield)
     response = shield.response.copy(deep=True)
     response["snap"][1, 0, 4] = float(response["time"][4])

@@ -37,12 +37,15 @@ def reel(cases: int = 2) -> Animation:
     return Animation(axis, [f"α = {k}°" for k in range(cases)], [first, second], [field])
 
 
-def test_load_cases_stand_in_columns_and_structures_in_rows() -> None:
+def test_load_cases_stand_in_columns_and_run_as_in_the_player() -> None:
     placed = layout(reel())
     where = [(cell.clip.name, cell.case, cell.row, cell.column) for cell in placed.cells]
     assert where == [("Altered", 0, 0, 0), ("Altered", 1, 0, 1), ("Cloaked", 0, 1, 0)]
     side_by_side = [(cell.row, cell.column) for cell in layout(reel(1)).cells]
     assert side_by_side == [(0, 0), (0, 1)]
+    assert len(instants(reel())) == RATE
+    slow = replace(reel().axis, speeds={"slow": 0.5})
+    assert len(instants(replace(reel(), axis=slow))) == 2 * RATE
 
 
 def test_units_are_where_they_should_be_in_the_colour_of_their_motion() -> None:
@@ -55,12 +58,6 @@ def test_units_are_where_they_should_be_in_the_colour_of_their_motion() -> None:
         at = (np.array(point) - placed.corner) * [1, -1] * placed.scale
         x, y = np.rint(at + placed.origin(placed.cells[0])).astype(int)
         np.testing.assert_allclose(last[y, x], 255 * colour, atol=3)
-
-
-def test_it_runs_at_the_speed_of_the_player() -> None:
-    assert len(instants(reel())) == RATE
-    slow = replace(reel().axis, speeds={"slow": 0.5})
-    assert len(instants(replace(reel(), axis=slow))) == 2 * RATE
 
 
 def test_the_same_frames_make_the_same_bytes(tmp_path: Path) -> None:

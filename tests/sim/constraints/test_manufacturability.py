@@ -77,7 +77,7 @@ def block_angles(lattice: structure.Lattice, vertices: Floats) -> Floats:
     return np.asarray(np.mod(np.angle(preceding / following), 2 * np.pi))
 
 
-def test_margins_are_those_of_the_geometry() -> None:
+def test_margins_are_those_of_the_geometry_and_name_the_worst_unit() -> None:
     design = random_design(1.0)
     vertices = CONSTRAINTS.vertices(design)
     np.testing.assert_allclose(vertices, SPACE.vertices(jnp.asarray(design)), atol=1e-13)
@@ -98,9 +98,6 @@ def test_margins_are_those_of_the_geometry() -> None:
     assert found["gap"].value == pytest.approx(
         structure.smallest_gap(LATTICE, vertices).distance - 0.2
     )
-
-
-def test_the_worst_unit_is_named() -> None:
     vertices = LATTICE.vertices.copy()
     unit = 3 + 5 * 2
     vertices[4 * unit] = vertices[4 * unit + 1] + [0.5, -0.5]

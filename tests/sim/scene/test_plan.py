@@ -189,7 +189,7 @@ def test_integrators_fit_the_scene_or_are_chosen(changes: dict[str, Any], integr
     assert plan.describe().startswith(f"integrator: {integrator}")
 
 
-def test_a_recorded_drive_gets_an_adapted_grid() -> None:
+def test_the_grid_depends_on_the_drive_and_not_on_the_design() -> None:
     knots = np.linspace(0.0, 0.2, 9)
     push = np.outer(np.sin(np.pi * knots / 0.2) ** 2, [2.0, 0.5, 0.02])
     posed = scene(motions=(sim.TimeSeries(knots, push),), weights=np.ones(1), frequency=None)
@@ -198,6 +198,12 @@ def test_a_recorded_drive_gets_an_adapted_grid() -> None:
     assert any("adapted" in line for line in plan.decisions)
     assert np.diff(plan.solver.times).max() / np.diff(plan.solver.times).min() > 2
     assert sim.Evaluator(posed, plan)(np.zeros(posed.space.n_variables))[0] > 0
+    posed = scene()
+    one = sim.make_plan(posed).solver
+    other = sim.make_plan(posed, vertices=np.asarray(posed.space.vertices(design_of(posed)))).solver
+    assert isinstance(one, ImplicitSolver)
+    assert isinstance(other, ImplicitSolver)
+    np.testing.assert_array_equal(one.times, other.times)
 
 
 def test_a_plan_tells_what_it_skips_and_can_be_stored() -> None:
@@ -206,12 +212,3 @@ def test_a_plan_tells_what_it_skips_and_can_be_stored() -> None:
     for part in ("unloaded reference", "2 of 4 load cases", "parameter derivatives", "contact of"):
         assert any(part in line for line in told.splitlines() if line.startswith("skipped: "))
     assert json.loads(json.dumps(plan.record())) == plan.record()
-
-
-def test_the_grid_does_not_depend_on_the_design() -> None:
-    posed = scene()
-    one = sim.make_plan(posed).solver
-    other = sim.make_plan(posed, vertices=np.asarray(posed.space.vertices(design_of(posed)))).solver
-    assert isinstance(one, ImplicitSolver)
-    assert isinstance(other, ImplicitSolver)
-    np.testing.assert_array_equal(one.times, other.times)

@@ -57,10 +57,7 @@ def test_strains_of_a_strip_are_those_of_a_bent_beam() -> None:
         given = (0.01 * LENGTH, -(a + b) / 2, b - a)
         strains = face_strains(given, (shearing, bending), LENGTH, FOIL.thickness)
         assert max(map(abs, strains)) == pytest.approx(0.01 + curvature * FOIL.thickness / 2)
-
-
-def test_measured_stiffnesses_tell_how_far_shear_bends_a_strip() -> None:
-    """The moments at its ends are those that balance the shear force."""
+    # the moments at its ends are those that balance the shear force
     shearing, bending, angle = 1.19, 1.5, 0.3
     moment = shearing * LENGTH * angle * LENGTH / 2
     strains = face_strains((0.0, angle, 0.0), (shearing, bending), LENGTH, FOIL.thickness)
