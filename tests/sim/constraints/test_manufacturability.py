@@ -84,9 +84,9 @@ def test_margins_are_those_of_the_geometry_and_name_the_worst_unit() -> None:
     found = margins(LATTICE, vertices, LIMITS)
     edges = np.linalg.norm(vertices[LATTICE.next_vertex] - vertices, axis=1)
     assert tuple(found)[-4:] == ("gap", "slot_angle", "slot_wall", "slot_gap")
-    first, second = lattice.unit[slot_pairs(lattice)[:, [1, 6]]].T
+    first, second = LATTICE.unit[slot_pairs(LATTICE)[:, [1, 6]]].T
     np.testing.assert_array_equal(first, second)
-    ends = np.bincount(lattice.ligament_units.ravel())
+    ends = np.bincount(LATTICE.ligament_units.ravel())
     np.testing.assert_array_equal(np.bincount(first), ends * (ends - 1) // 2)
     assert found["edge_length"].value == pytest.approx(edges.min() - 5)
     angles = block_angles(LATTICE, vertices)
