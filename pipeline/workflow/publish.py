@@ -28,7 +28,7 @@ BUILT = "published"
 """Folder of the crate that holds what was made."""
 _BESIDE = ("LICENSE", "CITATION.cff", "README.md", "Makefile", "pyproject.toml", "setup.py")
 _LOCKS = ("requirements.lock", "requirements-dev.lock")
-_FOLDERS = ("benchmarks", "metacloak")
+_FOLDERS = ("benchmarks", "docs", "metacloak")
 _PROFILES = {
     "https://w3id.org/ro/wfrun/process/0.5": ("Process Run Crate", "0.5"),
     "https://w3id.org/ro/wfrun/workflow/0.5": ("Workflow Run Crate", "0.5"),
