@@ -62,7 +62,7 @@ def test_the_slider_runs_over_uneven_loads_of_a_single_case(browser: Chrome) -> 
     scrub(browser, 0.5)
     assert at(browser) == pytest.approx(2.5)
     assert not browser.find_elements(By.ID, "player-case")
-    assert browser.find_element(By.CSS_SELECTOR, "#player output").text == "load = 0.0 mm"
+    assert browser.find_element(By.CSS_SELECTOR, "#player output").text == "load = 2.5 mm"
 
 
 def test_a_lost_unit_stays_blank(browser: Chrome) -> None:
