@@ -31,7 +31,7 @@ _QUICK, _SHARP = 2.0, 0.7
 may be blurred by its motion where the exposure is not known."""
 _PARTS = np.linspace(0.0, 1.0, 9)
 """Exposures that are tried where none is told, over the interval of frames."""
-_TELLING, _FEW_QUICK, _MANY_QUICK, _ENOUGH = 5.0, 3, 48, 5
+_TELLING, _FEW_QUICK, _MANY_QUICK, _ENOUGH = 5.0, 3, 16, 5
 """Motion from frame to frame that tells of the exposure, px; units that must make it, and that are
 looked at, at most; frames."""
 _MIXED = 2.5
