@@ -24,6 +24,8 @@ _SETTLED = 0.3
 _SHARE = 0.35
 """Least part of a unit's information that a fit needs; less if photometry and place are known."""
 _SHARE_KNOWN = 0.18
+_PARTLY, _SHADED = 0.6, 0.15
+"""What is seen of a unit in part, less than so much, is as bright as before: change of slopes."""
 _GAIN = (0.12, 4.0)
 """Gain, against the reference frame's, between which a unit can be seen."""
 _QUICK, _SHARP = 2.0, 0.7
@@ -271,6 +273,8 @@ class Tracker:
         if sharp and not self.exposure and self._interval > 0:
             quick = np.linalg.norm((fits.pose - self._pose)[:, :2], axis=1) > _QUICK * self._pixel
             fitting &= ~(quick & (seen < _SHARP))
+        shaded = np.linalg.norm((fits.photometry - self._photometry)[:, 2:], axis=1)
+        settled &= (seen > _PARTLY) | (shaded < _SHADED)
         lit = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
         return np.isfinite(fits.pose[:, 0]) & settled & fitting & lit & self._seen
 

@@ -33,6 +33,9 @@ _LEAST_FREEDOM = 0.2
 _SEEN = 0.9
 """Part of the units of the fullest frame that one must show to tell of the shapes' amplitudes."""
 _OWN = 0.3
+_JITTER = 4.0
+"""Variance by which a codec shows frames at other times, at most, over that of its noise; what is
+more is a motion too quick, or seen in too few frames, to be followed."""
 
 
 def standard_errors(scatter: Floats, blocks: Floats) -> Floats:
@@ -141,7 +144,8 @@ def _ratio(
     jitter = (motion_modes.amplitude_jitter(found.amplitude, followed, time) @ found.shape) ** 2
     noise = found.rest**2 / np.maximum(freedom, _LEAST_FREEDOM)
     if known.any():  # white noise shakes the shapes' amplitudes too, and is counted in the rest
-        jitter = np.maximum(jitter - by_unit * float(np.mean(noise[known])), 0.0)
+        usual = float(np.mean(noise[known]))
+        jitter = np.clip(jitter - by_unit * usual, 0.0, _JITTER * usual)
     spread = noise + jitter
     ratio = np.where(known & (freedom > _LEAST_FREEDOM), spread / sigma**2, np.nan)
     if not np.isfinite(ratio).any():
