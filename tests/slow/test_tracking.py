@@ -13,6 +13,7 @@ from pipeline.tracking.motion import track_video
 from pipeline.tracking.motion.tracker import TrackedFrame, Tracker
 from tests.pipeline.tracking import test_wild_clips
 from tests.pipeline.tracking.conftest import CLIPS, check_accuracy, tracked
+from tests.tables import cases
 
 _KEPT = 4 * 225 * 6  # bytes of poses and uncertainties, single precision
 
@@ -20,9 +21,7 @@ _KEPT = 4 * 225 * 6  # bytes of poses and uncertainties, single precision
 @pytest.mark.parametrize(
     ("name", "translation", "rotation"), [("b_harmonic", 0.022, 0.09), ("e_speckle", 0.018, 0.04)]
 )
-def test_units_are_tracked_to_a_fraction_of_a_pixel(
-    name: str, translation: float, rotation: float
-) -> None:
+def test_errors_are_parts_of_a_pixel(name: str, translation: float, rotation: float) -> None:
     check_accuracy(name, translation, rotation)
 
 
@@ -51,20 +50,9 @@ def test_speckled_units_agree_with_an_independent_correlation() -> None:
     assert np.sqrt(np.mean(np.square(apart))) < 0.05
 
 
-@pytest.mark.parametrize(
-    ("name", "frames", "rms", "lost"),
-    [
-        ("leaves_and_returns", 44, 0.012, 0.02),
-        ("low_light", 8, 0.06, 0.0),
-        ("tripod_knocked", 16, 0.008, 0.0),
-        ("returns_turned", 44, 0.012, 0.25),
-        ("shaken_and_rolling", 16, 0.5, 1.0),
-    ],
-)
-def test_no_unit_is_wrong_and_called_good(
-    name: str, frames: int, rms: float, lost: float, tmp_path: Path
-) -> None:
-    test_wild_clips.test_no_unit_is_wrong_and_called_good(name, frames, rms, lost, tmp_path)
+@cases("tracking", "name, frames, rms, lost")
+def test_nothing_is_wrong(name: str, frames: int, rms: float, lost: float, tmp_path: Path) -> None:
+    test_wild_clips.test_no_unit_is_wrong(name, frames, rms, lost, tmp_path)
 
 
 def _looped(monkeypatch: pytest.MonkeyPatch, length: int) -> int:

@@ -12,18 +12,14 @@ from benchmarks.tracking.rendering import write_video
 from pipeline.runtime import UserError
 from pipeline.tracking.detect import orientation_text
 from pipeline.tracking.frames import BrokenOffError, Frame, import_video, read_frames
-from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design
-from pipeline.tracking.motion import track_video
+from pipeline.tracking.geometry import outlines_of_design
+from pipeline.tracking.motion import Track, track_video
 from tests.pipeline.tracking.conftest import CLIPS
 from tests.pipeline.virtual_lab.conftest import GRID, film_of
 
 SCALE = 1 / 0.365
 WIDTH = 320
-
-
-@pytest.fixture(scope="module")
-def specimen() -> SpecimenOutlines:
-    return outlines_of_design(import_video.design(GRID))
+SPECIMEN = outlines_of_design(import_video.design(GRID))
 
 
 @pytest.fixture(scope="module")
@@ -32,26 +28,25 @@ def clip() -> list[np.ndarray]:
     return list(film_of("bare").images())[2:6]
 
 
-def timed(images: list[np.ndarray]) -> list[Frame]:
-    return [Frame(index, index / 300, image) for index, image in enumerate(images)]
+def timed(images: list[np.ndarray]) -> Iterator[Frame]:
+    return (Frame(index, index / 300, image) for index, image in enumerate(images))
 
 
-def test_units_are_found_again_after_a_black_frame(
-    specimen: SpecimenOutlines, clip: list[np.ndarray]
-) -> None:
-    shown = timed([*clip[:2], np.zeros_like(clip[0]), *clip[2:]])
-    track = track_video(iter(shown), specimen, SCALE)
+def followed(shown: Iterator[Frame]) -> Track:
+    return track_video(shown, SPECIMEN, SCALE)
+
+
+def test_units_are_found_again_after_a_black_frame(clip: list[np.ndarray]) -> None:
+    track = followed(timed([*clip[:2], np.zeros_like(clip[0]), *clip[2:]]))
     assert np.isnan(track.displacement[2]).all()
     assert (track.quality[2] != 0).all()
     assert (track.quality[3:] == 0).all()
 
 
-def test_a_video_from_behind_has_the_same_motions(
-    specimen: SpecimenOutlines, clip: list[np.ndarray]
-) -> None:
-    plain = track_video(iter(timed(clip)), specimen, SCALE)
+def test_a_video_from_behind_has_the_same_motions(clip: list[np.ndarray]) -> None:
+    plain = followed(timed(clip))
     mirrored = [np.ascontiguousarray(image[:, ::-1]) for image in clip]
-    behind = track_video(iter(timed(mirrored)), specimen, SCALE)
+    behind = followed(timed(mirrored))
     assert "mirrored" in orientation_text(behind.calibration.camera)
     apart = behind.displacement - plain.displacement
     assert np.sqrt(np.mean(apart[..., :2] ** 2)) / plain.calibration.pixel < 0.01
@@ -66,9 +61,7 @@ def test_pictures_of_16_bit_in_a_folder_are_a_video(tmp_path: Path, clip: list[n
     np.testing.assert_allclose(read[3].image, clip[3], atol=1e-3)
 
 
-def test_pictures_without_a_rate_or_of_another_size_are_told(
-    tmp_path: Path, clip: list[np.ndarray]
-) -> None:
+def test_faulty_folders_of_pictures_are_told(tmp_path: Path, clip: list[np.ndarray]) -> None:
     with pytest.raises(UserError, match="no pictures"):
         list(read_frames(tmp_path, rate=1.0))
     cv2.imwrite(str(tmp_path / "a1.png"), clip[0])
@@ -117,28 +110,26 @@ def test_a_clip_of_a_few_frames_is_whole(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("error", [BrokenOffError("it breaks off"), KeyboardInterrupt()])
 def test_what_was_tracked_before_an_end_is_kept(
-    specimen: SpecimenOutlines, clip: list[np.ndarray], error: BrokenOffError | KeyboardInterrupt
+    clip: list[np.ndarray], error: BrokenOffError | KeyboardInterrupt
 ) -> None:
     def shown() -> Iterator[Frame]:
         yield from timed(clip[:2])
         raise error
 
-    track = track_video(shown(), specimen, SCALE)
+    track = followed(shown())
     assert track.ended is error
     assert track.displacement.shape[0] == len(track.time) == len(track.quality) == 2
 
 
-def test_a_specimen_that_jumped_is_found_again(
-    specimen: SpecimenOutlines, clip: list[np.ndarray]
-) -> None:
+def test_a_specimen_that_jumped_is_found_again(clip: list[np.ndarray]) -> None:
     """By half the distance of two units, where a neighbour is as near as the unit itself."""
     turn = cv2.getRotationMatrix2D((WIDTH / 2, WIDTH / 2), 21.0, 1.0)
     moved = turn + np.array([[0, 0, -9.0], [0, 0, 17.0]])
     jumped = cv2.warpAffine(clip[0], moved, (WIDTH, WIDTH), borderValue=205)
-    track = track_video(iter(timed([clip[0], jumped])), specimen, SCALE)
+    track = followed(timed([clip[0], jumped]))
     camera, pose = track.calibration.camera, track.displacement[1]
-    wanted = camera.project(specimen.centre) @ moved[:, :2].T + moved[:, 2]
-    seen = camera.project(specimen.centre + pose[:, :2])
+    wanted = camera.project(SPECIMEN.centre) @ moved[:, :2].T + moved[:, 2]
+    seen = camera.project(SPECIMEN.centre + pose[:, :2])
     inside = ((wanted > 20) & (wanted < WIDTH - 21)).all(axis=1)
     assert (track.quality[1:, inside] == 0).all()
     assert np.abs(seen - wanted)[inside].max() < 0.5

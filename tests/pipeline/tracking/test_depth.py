@@ -54,9 +54,7 @@ def test_a_distance_tells_where_the_camera_stands() -> None:
 
 
 @pytest.mark.parametrize("offset", [(0.5, 0.2), (-0.4, 0.0)])
-def test_the_silhouette_of_a_convex_unit_is_the_hull_of_face_and_back(
-    offset: tuple[float, float],
-) -> None:
+def test_silhouettes_of_convex_units_are_hulls_of_two_faces(offset: tuple[float, float]) -> None:
     polygon = np.array([[6.0, 2.0], [-2.0, 6.0], [-6.0, -2.0], [2.0, -6.0]])
     depth = Depth(8.0, np.zeros(2), 1000.0)
     back = depth.shrink * polygon + offset

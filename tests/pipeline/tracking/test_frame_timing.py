@@ -5,6 +5,7 @@ import pytest
 
 from pipeline.tracking.frames import video
 from pipeline.tracking.motion import frame_timing, uncertainty, video_tracking
+from sim.core import Floats
 
 NOISE = 0.004
 FRAMES = 60
@@ -21,9 +22,7 @@ def motion(clock: np.ndarray, seed: int = 0) -> np.ndarray:
     return made + NOISE * random.normal(size=made.shape)
 
 
-def faults(
-    moved: np.ndarray, time: np.ndarray | None = None, same: tuple[int, ...] = ()
-) -> dict[int, int]:
+def faults(moved: Floats, time: Floats | None = None, same: tuple[int, ...] = ()) -> dict[int, int]:
     """Finds faults of motions whose frames the file takes to be even, some shown again."""
     time = np.arange(len(moved)) / 30 if time is None else time
     again = np.isin(np.arange(len(moved)), same)
@@ -31,8 +30,11 @@ def faults(
     return {int(frame): int(told[frame]) for frame in np.flatnonzero(told)}
 
 
-def test_even_frames_have_no_fault() -> None:
+def test_even_frames_and_a_specimen_at_rest_have_no_fault() -> None:
     assert faults(motion(np.arange(FRAMES, dtype=float))) == {}
+    moved = motion(np.maximum(np.arange(FRAMES) - 20.0, 0.0))
+    assert faults(moved, same=tuple(range(1, 20))) == {}
+    assert faults(motion(np.arange(FRAMES)), same=tuple(range(20, 25))) == {}
 
 
 @pytest.mark.parametrize("frame", [12, 25, 40])
@@ -44,15 +46,12 @@ def test_a_gap_is_found_by_the_motion_and_by_the_stamps(frame: int, missing: int
     assert faults(motion(clock), clock / 30) == {frame: frame_timing.DROPPED}
 
 
-def test_a_varying_rate_is_no_row_of_gaps() -> None:
+def test_a_varying_rate_is_no_row_of_gaps_nor_of_rounded_stamps() -> None:
     clock = np.cumsum(np.random.default_rng(3).choice([1.0, 1.5, 2.0, 3.0], FRAMES))
     assert faults(motion(clock), clock / 60) == {}
-
-
-def test_a_specimen_that_rests_is_no_row_of_repeated_frames() -> None:
-    moved = motion(np.maximum(np.arange(FRAMES) - 20.0, 0.0))
-    assert faults(moved, same=tuple(range(1, 20))) == {}
-    assert faults(motion(np.arange(FRAMES)), same=tuple(range(20, 25))) == {}
+    steady = np.arange(FRAMES) / 30
+    assert not video.has_uneven_intervals(np.round(steady, 3))
+    assert video.has_uneven_intervals(np.delete(steady, [7, 30]))
 
 
 def test_a_picture_is_the_same_but_for_a_codec() -> None:
@@ -113,21 +112,12 @@ def test_stated_uncertainty_is_that_of_the_noise() -> None:
     moved[20:30, 5] = np.nan
     told = uncertainty.calibrate_sigma(moved, np.full(moved.shape, NOISE / 5), CENTRE, steady)
     assert np.median(told) == pytest.approx(NOISE, rel=0.15)
-
-
-def test_units_that_are_seen_badly_say_so() -> None:
     random = np.random.default_rng(1)
     clock = np.arange(FRAMES, dtype=float)
     moved, steady = motion(clock), np.ones(FRAMES, dtype=bool)
     moved[:, 9] += 4 * NOISE * random.normal(size=moved[:, 9].shape)
     told = uncertainty.calibrate_sigma(moved, np.full(moved.shape, NOISE), CENTRE, steady)
     assert np.median(told[:, 9]) > 2.5 * np.median(told)
-
-
-def test_a_varying_rate_is_told_from_rounded_stamps() -> None:
-    steady = np.arange(FRAMES) / 30
-    assert not video.has_uneven_intervals(np.round(steady, 3))
-    assert video.has_uneven_intervals(np.delete(steady, [7, 30]))
 
 
 @pytest.mark.parametrize("share", [0.15, 0.35, 0.6])

@@ -2,7 +2,6 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.problem.fields import csv_columns
 from pipeline.tracking.frames import load_cell
 from pipeline.tracking.frames.recording import LoadCellLog
 from tests.tables import cases, refused
@@ -38,8 +37,3 @@ def test_a_faulty_log_is_refused(tmp_path: Path, text: str, offset: float, told:
     path, cell = log(tmp_path, text), LoadCellLog(file="load.csv", offset=offset)
     with refused(told):
         load_cell.check(load_cell.read(path, cell), TIME, path, cell)
-
-
-def test_a_log_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with refused("no such file"):
-        csv_columns.read_columns(tmp_path / "none.csv", ["a"])

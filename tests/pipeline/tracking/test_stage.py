@@ -6,6 +6,7 @@ import pytest
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
+from tests.pipeline.conftest import Failing
 from tests.pipeline.tracking.conftest import CLIPS
 from tests.tables import cases
 
@@ -20,12 +21,8 @@ def recording(tmp_path: Path) -> Path:
     return tmp_path / "f_silhouette_recording.yaml"
 
 
-def refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """Returns what the stage says when it refuses; it must leave nothing behind."""
-    out = recording.with_name("track.nc")
-    assert run_stage("track", [str(recording), "--out", str(out)]) == 2
-    assert not out.exists()
-    return capsys.readouterr().err
+def refused(recording: Path, failing: Failing) -> str:
+    return failing("track", [str(recording), "--out", str(recording.with_name("track.nc"))])
 
 
 def changed(recording: Path, old: str, new: str) -> None:
@@ -38,9 +35,7 @@ def extended(recording: Path, line: str) -> None:
     recording.write_text(recording.read_text(encoding="utf-8") + line + "\n", encoding="utf-8")
 
 
-def test_patches_turned_by_170_degrees_are_found_by_a_command(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_command_finds_turned_patches(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pictures = [str(CLIPS / f"dic/rotation_{turn}.png") for turn in ("000", "170")]
     out, at = tmp_path / "motions.csv", ["256", "256", "200", "180"]
     assert run_stage("track", ["pair", *pictures, "--at", *at, "--out", str(out)]) == 0
@@ -80,21 +75,19 @@ def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
 
 @cases("tracking", "old, new, told")
 def test_another_design_is_refused(
-    recording: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, told: str
+    recording: Path, failing: Failing, old: str, new: str, told: str
 ) -> None:
     other = recording.with_name("other.yaml")
     other.write_bytes((CLIPS / "f_silhouette.yaml").read_bytes())
     changed(other, old, new)
     folder = str(recording.parent)
     assert run_stage("track", ["import", str(other), "--video", VIDEO, "--out-dir", folder]) == 0
-    words = refused(recording, capsys)
+    words = refused(recording, failing)
     assert "does not show this design" in words
     assert told in words
 
 
-def test_a_lattice_that_looks_the_same_turned_is_as_the_recording_says(
-    recording: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_turned_lattice_is_as_told(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A log of another time leaves the track without forces."""
     recording.with_name("load.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
     text = recording.read_text(encoding="utf-8")
@@ -112,8 +105,8 @@ def test_a_lattice_that_looks_the_same_turned_is_as_the_recording_says(
 
 
 @cases("tracking", "old, new, told")
-def test_a_recording_that_cannot_be_tracked_is_refused(
-    recording: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, told: str
+def test_what_cannot_be_tracked_is_refused(
+    recording: Path, failing: Failing, old: str, new: str, told: str
 ) -> None:
     with av.open(str(recording.with_name("black.mkv")), "w") as container:
         stream = container.add_stream("ffv1", rate=10)
@@ -125,23 +118,18 @@ def test_a_recording_that_cannot_be_tracked_is_refused(
         changed(recording, old.replace("VIDEO", VIDEO), new)
     else:
         extended(recording, new)
-    words = refused(recording, capsys)
+    words = refused(recording, failing)
     assert told in words
     assert "units;" not in words  # before tracking
 
 
 @cases("tracking", "words, told")
-def test_a_command_that_lacks_something_is_told_what(
-    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run_stage("track", words) == 2
-    assert told in capsys.readouterr().err
+def test_what_a_command_lacks_is_told(words: list[str], told: str, failing: Failing) -> None:
+    assert told in failing("track", words)
 
 
 @pytest.mark.parametrize("comment", [None, "SYNTHETIC"])
-def test_an_imported_video_is_synthetic_if_its_file_says_so(
-    comment: str | None, tmp_path: Path
-) -> None:
+def test_an_imported_video_is_synthetic_as_told(comment: str | None, tmp_path: Path) -> None:
     lines = (CLIPS / "f_silhouette.yaml").read_text(encoding="utf-8").splitlines()
     told = [line for line in lines if not line.startswith("synthetic")]
     (tmp_path / "run.yaml").write_text("\n".join(told), encoding="utf-8")

@@ -13,7 +13,7 @@ def _template() -> tuple[np.ndarray, np.ndarray]:
     return brightness.astype(np.float32), weight.astype(np.float32)
 
 
-def test_cells_with_weight_are_steep_where_the_brightness_changes() -> None:
+def test_cells_are_steep_where_the_brightness_changes_and_unfolded() -> None:
     brightness, weight = _template()
     made = template_cells.classify_templates(brightness[None], weight[None], np.array([50.0]))
     kind = made.kind[0]
@@ -22,9 +22,6 @@ def test_cells_with_weight_are_steep_where_the_brightness_changes() -> None:
     assert kind[15, 22] == template_cells.FLAT
     corners = weight[:-1, :-1] + weight[1:, :-1] + weight[:-1, 1:] + weight[1:, 1:]
     assert ((kind[:-1, :-1] != template_cells.EMPTY) == (corners > 0)).all()
-
-
-def test_nodes_are_unfolded_wherever_a_cell_reads_them() -> None:
     brightness, weight = _template()
     made = template_cells.classify_templates(brightness[None], weight[None], np.array([50.0]))
     nodes = np.full((SIZE, SIZE, 4), np.nan, np.float32)

@@ -18,9 +18,7 @@ def swing(time: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("readout", "exposure"), [(0.03, 0.0), (0.0, 0.025), (0.02, 0.01)])
-def test_poses_are_those_at_the_frames_times_and_sigma_holds(
-    readout: float, exposure: float
-) -> None:
+def test_poses_are_those_at_frames_times_and_sigma_holds(readout: float, exposure: float) -> None:
     time = np.arange(30) / RATE
     late = readout * np.linspace(-0.5, 0.5, UNITS) + np.zeros((30, 1))
     bend = np.full((30, UNITS, 3), exposure**2 / 24)

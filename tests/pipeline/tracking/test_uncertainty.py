@@ -62,9 +62,6 @@ def test_rough_shapes_of_a_cloaked_structure_are_motion(told: float) -> None:
 def test_smooth_shapes_are_motion_however_small() -> None:
     smooth = np.sin(np.linspace(0, 6, 60))[:, None] * np.cos(CENTRE[:, 0] / 60) * 0.2
     assert_spread(_made(smooth, np.full(60, 0.05), 2.5, 3), *HONEST)
-
-
-def test_what_noise_drifts_by_at_rest_is_no_motion() -> None:
     random = np.random.default_rng(4)
     drift = np.cumsum(0.02 * random.normal(size=(40, len(CENTRE), 3)), axis=0)
     image = np.full_like(drift, 0.05)

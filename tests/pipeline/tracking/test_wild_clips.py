@@ -12,6 +12,7 @@ from pipeline.tracking.detect import detect_lattice
 from pipeline.tracking.fit import frame_fit
 from pipeline.tracking.motion import Track, track_video
 from pipeline.tracking.reference_frame import RecordingSetup
+from tests.tables import cases
 
 
 def shown(name: str, folder: Path, frames: int) -> tuple[WildClip, Track]:
@@ -19,22 +20,9 @@ def shown(name: str, folder: Path, frames: int) -> tuple[WildClip, Track]:
     return clip, tracked(clip)
 
 
-@pytest.mark.parametrize(
-    ("name", "frames", "rms", "lost"),
-    [
-        ("hand_over_a_corner", 18, 0.012, 0.02),
-        ("motion_blur", 10, 0.01, 0.0),
-        ("rolling_shutter", 10, 0.007, 0.0),
-        ("fisheye", 6, 0.01, 0.0),
-        ("red_on_teal", 6, 0.03, 0.0),
-        ("bolts_and_tape", 6, 0.01, 0.0),
-        ("glare", 5, 0.05, 0.02),
-        ("mains_flicker", 6, 0.012, 0.0),
-    ],
-)
-def test_no_unit_is_wrong_and_called_good(
-    name: str, frames: int, rms: float, lost: float, tmp_path: Path
-) -> None:
+@cases("tracking", "name, frames, rms, lost")
+def test_no_unit_is_wrong(name: str, frames: int, rms: float, lost: float, tmp_path: Path) -> None:
+    """Or called good where it is."""
     clip, track = shown(name, tmp_path, frames)
     found = errors(clip, track)
     assert found.gross == 0
@@ -43,9 +31,7 @@ def test_no_unit_is_wrong_and_called_good(
     assert ((track.quality == 0) == np.isfinite(track.displacement[..., 0])).all()
 
 
-def test_units_fitted_side_by_side_are_those_fitted_in_turn(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_threads_change_no_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     clip, tracks = make("plain", tmp_path, 2), []
     for threads in (1, 3):
         monkeypatch.setattr(frame_fit, "_THREADS", threads)
@@ -96,9 +82,7 @@ def test_a_picture_shown_again_is_told(tmp_path: Path) -> None:
     np.testing.assert_array_equal(track.timing == 1, clip.fault)
 
 
-def test_a_camera_that_moves_is_told_or_refused_without_supports(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_camera_that_moves_is_told_of(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     clip = make("tripod_knocked", tmp_path, 14)
     fixed = RecordingSetup(held=clip.held)
     with caplog.at_level("WARNING"):
