@@ -301,4 +301,16 @@ SCRIPTS: dict[str, ClipScript] = {
         keys={"follows_supports": True, "readout": 0.02, "exposure": 0.008},
     ),
 }
+SCRIPTS |= {
+    "phone_for_8_s": SCRIPTS["phone"]._replace(
+        view=View(readout=0.02, exposure=0.008, size=(1280, 720), scale=3.0),
+        times=np.cumsum(np.r_[0.0, np.random.default_rng(6).choice([0.97, 1.0, 1.03], 239)]) / RATE,
+        grid={**GRID, "grid": [15, 15]},
+    ),
+    "drifts_from_the_start": ClipScript(
+        shift=lambda t: np.stack([0.02 * t, 0 * t], axis=-1), pace=lambda t: 0 * t, times=_LONG
+    ),
+    "fist_in_noise": SCRIPTS["hand_over_a_corner"]._replace(view=View(noise=(8.0, 0.12))),
+    "returns_h264": SCRIPTS["leaves_and_returns"]._replace(film=("libx264", "yuv420p", 20)),
+}
 """The clips by name."""

@@ -130,7 +130,7 @@ def track_video(
         if unsure.any():
             motion[unsure], qualities[unsure] = np.nan, POOR_FIT
             LOG.warning(
-                "%.0f %% of the poses are lost, as more moves from frame to frame than"
+                "%.2g %% of the poses are lost, as more moves from frame to frame than"
                 " tells where units were when other rows were read: film at a higher rate, or rest"
                 " in the first frame",
                 100 * unsure.mean(),
