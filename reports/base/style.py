@@ -5,6 +5,7 @@ that it will have in print. Colour maps are straight in lightness and even in OK
 2020), hence readable in grey and with any colour vision. Saved files carry no date.
 """
 
+import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -178,6 +179,8 @@ def save(figure: Figure, stem: Path, dpi: int = 300) -> list[Path]:
     paths = []
     for suffix, metadata in _METADATA.items():
         path = stem.with_suffix(f".{suffix}")
-        figure.savefig(path, format=suffix, dpi=dpi, metadata=metadata)
+        drawn = io.BytesIO()  # a full disk must not meet the compressor of a PDF
+        figure.savefig(drawn, format=suffix, dpi=dpi, metadata=metadata)
+        path.write_bytes(drawn.getvalue())
         paths.append(path)
     return paths
