@@ -85,7 +85,6 @@ def test_the_picture_shows_the_tables_whole() -> None:
     wanted = {"fig2": 4, "fig4": 3, "precision": 7, "warm": 2, "static": 6}
     assert {name: len(rows) for name, rows in found.items()} == wanted
     assert found["fig2"][0] == TableRow("ours", 0.443, 3.9e-05)
-    found = tables(PAGE.read_text(encoding="utf-8"))
     with style.styled():
         left, right = figure(found).axes
     ends = [bar.get_path().get_extents(bar.get_transform()) for bar in left.patches]

@@ -105,7 +105,6 @@ def test_loads_beyond_have_no_time_others_are_refused() -> None:
     assert found[0] == 0.0
     assert np.isfinite(found[:20]).all()
     assert np.isnan(found[22:]).all()
-    ramp = SampledMotion(TIMES, 10 * TIMES[:, None])
     with pytest.raises(UserError, match="cannot be aligned"):
         find_load_time(np.linspace(0.0, -15.0, 30), ramp)
     with pytest.raises(UserError, match="to and fro"):

@@ -33,8 +33,6 @@ def test_underside_is_the_mirror_image_and_the_arrow_points_up() -> None:
     for top, below in zip(placed.strokes, placed.mirrored, strict=True):
         assert below[:, 1] == pytest.approx(top[:, 1])
         assert below[:, 0] == pytest.approx(20.0 - top[:, 0])
-    placed = place_id("F7", WIDE, WIDE, Labels())
-    assert placed is not None
     stem, shaft = orientation_mark(WIDE, WIDE, placed.box, Labels())
     assert stem[1, 1] == max(stem[:, 1]) > stem[0, 1]
     assert shaft[1] == pytest.approx(stem[1])

@@ -22,11 +22,9 @@ def test_cells_are_steep_where_the_brightness_changes_and_unfolded() -> None:
     assert kind[15, 22] == template_cells.FLAT
     corners = weight[:-1, :-1] + weight[1:, :-1] + weight[:-1, 1:] + weight[1:, 1:]
     assert ((kind[:-1, :-1] != template_cells.EMPTY) == (corners > 0)).all()
-    brightness, weight = _template()
-    made = template_cells.classify_templates(brightness[None], weight[None], np.array([50.0]))
     nodes = np.full((SIZE, SIZE, 4), np.nan, np.float32)
     template_cells.unfold(brightness, weight, made.span[0], nodes.reshape(-1))
-    used = made.kind[0] != template_cells.EMPTY
+    used = kind != template_cells.EMPTY
     for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
         read = np.roll(used, (row, column), (0, 1))
         assert np.isfinite(nodes[read]).all()

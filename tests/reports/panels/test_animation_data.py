@@ -50,7 +50,6 @@ def test_motion_is_right_within_the_stated_error_at_kept_times(study: StudyResul
             error = np.abs(np.array(part["step"]) * levels - exact)
             assert error[..., :2].max() <= 1.001 * shift
             assert error[..., 2].max() <= 1.001 * turn
-    data = panels.payload(shielding_animation(study))
     values = decoded(data["axis"]["values"], "<f4")
     assert values[0] == 0.0
     assert values[-1] == np.float32(2.0)

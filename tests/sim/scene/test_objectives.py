@@ -45,8 +45,7 @@ def test_a_missed_target_is_relative_and_another_refused() -> None:
     every = DisplacementMimicking(units, 15.0, WEIGHTS)(jnp.asarray(MOTION), RIG.values)
     np.testing.assert_allclose(losses, np.sqrt(every) / size, rtol=1e-13)
     # one that is met costs nothing
-    units = np.array([3, 7, 20])
-    measure = RelativeMimicking(units, 15.0, WEIGHTS, MOTION[:, :, units], np.ones(2))
+    measure = RelativeMimicking(units, 15.0, WEIGHTS, target, np.ones(2))
     np.testing.assert_array_equal(measure(jnp.asarray(MOTION), RIG.values), 0.0)
     fewer = measure._replace(target=MOTION[:1, :, units])
     with pytest.raises(ValueError, match=r"\(1, 5, 3\) load cases.* give the reference"):
