@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from pipeline.calibration.inputs import Sampling
 from pipeline.calibration.population.curve_emulator import CurveEmulator, log_force
@@ -145,7 +145,7 @@ def student_band(curve: PosedCurve, constants: Floats) -> PredictionBand:
     """Finds Student's interval of a new sample from logarithms of constants (n_samples, 3)."""
     each = curve.predict(constants)
     count = len(each)
-    quantile = student.ppf((1 + LEVEL) / 2, count - 1) * np.sqrt(1 + 1 / count)
+    quantile = stdtrit(count - 1, (1 + LEVEL) / 2) * np.sqrt(1 + 1 / count)
     middle, reach = each.mean(axis=0), quantile * each.std(axis=0, ddof=1)
     return PredictionBand(middle, middle - reach, middle + reach)
 

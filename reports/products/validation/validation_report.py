@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from pipeline import datasets
 from pipeline.calibration.inputs import UNITS, KnownPictures
@@ -79,7 +79,7 @@ def report(args: argparse.Namespace) -> None:
 
 def _of_samples(made: xr.Dataset, asked: Mapping[str, Any]) -> dict[str, Any]:
     count = made.sizes["sample"]
-    quantile = student.ppf(0.975, count - 1) * np.sqrt(1 + 1 / count)
+    quantile = stdtrit(count - 1, 0.975) * np.sqrt(1 + 1 / count)
     return {
         "headline": list(_headline(made)),
         "shown": {

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.signal import lfilter
 
 from pipeline.comparison import pixel_size, register
 from pipeline.comparison.alignment import (
@@ -36,6 +35,8 @@ def filmed(
     lag: float, frames: int = 90, noise: float = 0.0, seed: int = 0, alike: float = 0.0
 ) -> SampledMotion:
     """Films the drive with noise, whose neighbours are correlated by `alike`."""
+    from scipy.signal import lfilter
+
     time = np.arange(frames) / RATE
     drawn = np.random.default_rng(seed).normal(0.0, noise, (frames, 2))
     drawn = lfilter([np.sqrt(1 - alike**2)], [1.0, -alike], drawn, axis=0)
