@@ -24,8 +24,9 @@ _SETTLED = 0.3
 _SHARE = 0.35
 """Least part of a unit's information that a fit needs; less if photometry and place are known."""
 _SHARE_KNOWN = 0.18
-_PARTLY, _SHADED = 0.6, 0.15
-"""What is seen of a unit in part, less than so much, is as bright as before: change of slopes."""
+_PARTLY, _SHADED = 0.6, (0.06, 0.15)
+"""What is seen of a unit is as bright as before: changes of slopes from which its fit has to be
+better, and from which one that is seen in part, less than so much, is none."""
 _GAIN = (0.12, 4.0)
 """Gain, against the reference frame's, between which a unit can be seen."""
 _QUICK, _SHARP = 2.0, 0.7
@@ -267,14 +268,15 @@ class Tracker:
         gain = fits.photometry[:, 0]
         relative = gain / self._gain
         seen = np.minimum(fits.share, 1.0)
+        shaded = np.linalg.norm((fits.photometry - self._photometry)[:, 2:], axis=1)
+        part = np.where(shaded < _SHADED[0], 0.5 * (1 + seen), seen)
         with np.errstate(invalid="ignore", divide="ignore"):
-            fitting = fits.noise / np.abs(gain) < self._limit * seen
+            fitting = fits.noise / np.abs(gain) < self._limit * part
         settled = fits.last < _SETTLED * seen**2
         if sharp and not self.exposure and self._interval > 0:
             quick = np.linalg.norm((fits.pose - self._pose)[:, :2], axis=1) > _QUICK * self._pixel
             fitting &= ~(quick & (seen < _SHARP))
-        shaded = np.linalg.norm((fits.photometry - self._photometry)[:, 2:], axis=1)
-        settled &= (seen > _PARTLY) | (shaded < _SHADED)
+        settled &= (seen > _PARTLY) | (shaded < _SHADED[1])
         lit = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
         return np.isfinite(fits.pose[:, 0]) & settled & fitting & lit & self._seen
 
