@@ -71,11 +71,7 @@ def measure_in_turn(
 
 
 def measure_settings(
-    method: Method,
-    reference: Mapping[str, Floats],
-    units: int,
-    limits: MeasuringLimits,
-    tell: Tell,
+    method: Method, reference: Mapping[str, Floats], units: int, limits: MeasuringLimits, tell: Tell
 ) -> list[Measurement]:
     """Measures every setting for every task; after one that takes too long, no tighter ones."""
     measured: list[Measurement] = []

@@ -48,10 +48,7 @@ def force(scene: Scene) -> Force:
         strain = ligament_energy(ends[0], ends[1], arm[0], arm[1], vector, LigamentLaw(*law))
         angles = contact_void_angles(void, ends[0, 2], ends[1, 2])
         return strain + jnp.sum(
-            contact_energy(
-                angles,
-                ContactLaw(contact, angle.barrier_angle, angle.cutoff_angle),
-            )
+            contact_energy(angles, ContactLaw(contact, angle.barrier_angle, angle.cutoff_angle))
         )
 
     of_ends = jax.vmap(jax.grad(energy))

@@ -36,10 +36,7 @@ def suite() -> Suite:
         "warm",
         "loss and gradient over 10 load steps of Figure 4, mean of a walk of 10 designs",
         ("paths from rest to a thousandth of the usual residual", partial(_walk, 1e-13, False)),
-        (
-            method(COLD, partial(_walk, 1e-10, False)),
-            method(WARM, partial(_walk, 1e-10, True)),
-        ),
+        (method(COLD, partial(_walk, 1e-10, False)), method(WARM, partial(_walk, 1e-10, True))),
         (
             Target("whole path", seconds_of(COLD), "s", at_most=0.15),
             Target(f"time {WARM} over time {COLD}", time_ratio(WARM, COLD), at_most=1.0),

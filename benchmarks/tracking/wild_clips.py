@@ -7,13 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.tracking.clip_scripts import GRID, SCRIPTS, ClipScript
-from benchmarks.tracking.rendering import (
-    Motion,
-    Renderer,
-    eight_bit,
-    pose_bound,
-    write_video,
-)
+from benchmarks.tracking.rendering import Motion, Renderer, eight_bit, pose_bound, write_video
 from pipeline.tracking.frames import Frame, import_video, read_frames
 from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design
 from pipeline.tracking.motion import Track, track_video

@@ -98,12 +98,7 @@ def follow_cycle(asked: LoadCycles, record: CycleRecord, folder: Path) -> CycleP
         return seen, -(seen.force_on(units_held[1]) * slope).sum(axis=1)
 
     seen, tension = seen_at(steps[1:], state)
-    past = trace_first_snap(
-        solver,
-        values,
-        drive,
-        found,
-    )
+    past = trace_first_snap(solver, values, drive, found)
     loads, states = (found.snaps, found.states[:0]) if past is None else past[:2]
     traced = np.interp(loads, steps, whole[:, 2]), seen_at(loads, states)[1]
     return CyclePath(

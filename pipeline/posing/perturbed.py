@@ -12,15 +12,7 @@ from pipeline.problem.sections import Robustness, Tolerances
 from pipeline.runtime import cli
 from sim.core import Floats
 from sim.energy import observe
-from sim.scene import (
-    Scene,
-    cases_of,
-    make_plan,
-    mimicking,
-    sample_times,
-    scales,
-    target_motion,
-)
+from sim.scene import Scene, cases_of, make_plan, mimicking, sample_times, scales, target_motion
 from sim.solvers import Measure, MotionLaw, Outcome, Solved, run_batch
 from sim.structure import MOST_ROUNDS, Perturbation, PerturbedStructure
 from sim.structure import perturbed as perturbed_structure

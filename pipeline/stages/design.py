@@ -40,14 +40,7 @@ from sim.optimise import (
     Result,
     SqpOptions,
 )
-from sim.scene import (
-    Paths,
-    Plan,
-    Scene,
-    constraints_of,
-    make_plan,
-    minimise,
-)
+from sim.scene import Paths, Plan, Scene, constraints_of, make_plan, minimise
 from sim.structure import overlapping_pairs, shape, smallest_gap
 
 LOG = logging.getLogger(__name__)
@@ -241,10 +234,7 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
         "vertices_initial": (("unit", "vertex", "xy"), intact.padded(intact.vertices)),
         "end_angles": (("ligament", "end"), slots),
         "centroid": (("unit", "xy"), whole(np.asarray(shape(lattice, vertices).centroid))),
-        "constraint_margin": (
-            ("constraint",),
-            [margin.value for margin in found.values()],
-        ),
+        "constraint_margin": (("constraint",), [margin.value for margin in found.values()]),
         "smallest_gap": ((), smallest_gap(lattice, vertices).distance),
         "overlaps": ((), len(overlapping_pairs(lattice, vertices))),
         "loss": (("evaluation",), [e.loss for e in history]),
@@ -264,10 +254,7 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
         "direction": (("case",), np.rad2deg(case_directions(asked))),
         "evaluation": (("evaluation",), np.arange(len(history))),
         "constraint": (("constraint",), list(found)),
-        "constraint_units": (
-            ("constraint",),
-            [margin.unit for margin in found.values()],
-        ),
+        "constraint_units": (("constraint",), [margin.unit for margin in found.values()]),
     }
     made = xr.Dataset(variables, coordinates)
     for name in ("loss", "loss_case", "best_loss"):

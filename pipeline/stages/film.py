@@ -92,10 +92,7 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
         encode_video(out, film.images(bar.update), virtual.rate, virtual.codec, labels)
     made = assemble_truth(film.response, film.present, film.motion, film.scene.view)
     datasets.write(made, out.with_name(f"{out.stem}_truth.nc"), "truth", origin)
-    comments = (
-        SYNTHETIC,
-        "Written by the stage film; python -m pipeline track takes it.",
-    )
+    comments = (SYNTHETIC, "Written by the stage film; python -m pipeline track takes it.")
     with write_atomically(described) as aside:
         text = recordings.recording_yaml(_described(asked, virtual, out, design), comments)
         aside.write_text(text, encoding="utf-8")

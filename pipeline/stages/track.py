@@ -26,12 +26,7 @@ from pipeline.tracking.frames import (
     rendered,
 )
 from pipeline.tracking.frames import recording as recordings
-from pipeline.tracking.geometry import (
-    as_built,
-    clamped_units,
-    outlines_of_design,
-    rotation_matrix,
-)
+from pipeline.tracking.geometry import as_built, clamped_units, outlines_of_design, rotation_matrix
 from pipeline.tracking.motion import Patch, Track, follow_patch, track_video
 from pipeline.tracking.output import assemble_track, dic_points, driven_units, write_track_table
 from pipeline.tracking.reference_frame import RecordingSetup, proposal

@@ -20,14 +20,7 @@ import numpy as np
 from jax import Array
 
 from sim.core import Floats, Ints, Numbers
-from sim.structure import (
-    ANGLE_LENGTH,
-    VOID_BRANCH,
-    Lattice,
-    SlotRoom,
-    angle_between,
-    unwrap,
-)
+from sim.structure import ANGLE_LENGTH, VOID_BRANCH, Lattice, SlotRoom, angle_between, unwrap
 
 
 def slot_depth(room: SlotRoom, along: Numbers, behind: Numbers, ahead: Numbers) -> Array:

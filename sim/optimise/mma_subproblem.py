@@ -191,10 +191,7 @@ class _InteriorPoint:
             (getattr(state, name), getattr(step, name))
             for name in ("y", "slack", "price", "floor", "left", "right")
         ]
-        pairs += [
-            (state.x - self.problem.low, step.x),
-            (self.problem.high - state.x, -step.x),
-        ]
+        pairs += [(state.x - self.problem.low, step.x), (self.problem.high - state.x, -step.x)]
         closing = max(float(np.max(-change / value, initial=0.0)) for value, change in pairs)
         return 1.0 / max(1.0, 1.01 * closing)
 

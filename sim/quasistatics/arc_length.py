@@ -77,10 +77,7 @@ def trace(
 
 
 def trace_first_snap(
-    solver: StaticSolver,
-    values: ConcreteParameters,
-    drive: PrescribedMotion,
-    record: StaticRecord,
+    solver: StaticSolver, values: ConcreteParameters, drive: PrescribedMotion, record: StaticRecord
 ) -> EquilibriumTrace | None:
     """Traces the path that the first snap of a solution leaves, from the last load before it.
 

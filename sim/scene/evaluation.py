@@ -18,11 +18,7 @@ from sim.optimise import Evaluation, Journal, MmaOptions, Result, SqpOptions
 from sim.optimise import minimise as minimise_loss
 from sim.quasistatics import StaticRecord, StaticSolver
 from sim.scene.objectives import combined
-from sim.scene.parameter_map import (
-    ParameterMap,
-    parameters_of_copies,
-    parameters_of_design,
-)
+from sim.scene.parameter_map import ParameterMap, parameters_of_copies, parameters_of_design
 from sim.scene.path_constraints import PathConstraints, check_unsnapped
 from sim.scene.plan import Plan, make_plan, sample_times
 from sim.scene.scene import Scene

@@ -21,11 +21,7 @@ from jax.custom_derivatives import SymbolicZero
 from sim.core import Floats, Ints, NewContactPairs, Numbers
 from sim.energy import Topology
 from sim.solvers.loads import FORCE, MotionLaw, held_values, loaded_units
-from sim.solvers.validation import (
-    check_free_dofs,
-    check_masses,
-    check_parameters,
-)
+from sim.solvers.validation import check_free_dofs, check_masses, check_parameters
 from sim.structure import ConcreteParameters, Parameters
 
 T = TypeVar("T")

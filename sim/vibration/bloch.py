@@ -223,13 +223,7 @@ def _cell_energy(cell: UnitCell, loose: Ints, state: Array, gradient: Array) -> 
 
 
 def _pair_energy(
-    pair: Array,
-    arm: Array,
-    vector: Array,
-    void: Array,
-    law: Array,
-    natural: Array,
-    contact: Array,
+    pair: Array, arm: Array, vector: Array, void: Array, law: Array, natural: Array, contact: Array
 ) -> Array:
     """Energy of a ligament and its two voids in terms of both units' motion (2, 3)."""
     voids = contact_void_angles(void, pair[0, 2], pair[1, 2])

@@ -49,9 +49,7 @@ def test_methods_run_in_turn(toy: tuple[list[Measurement], list[str]]) -> None:
     assert rounds == [f"round {turn}" for turn in turns]
 
 
-def test_measured_times_errors_work_and_memory(
-    toy: tuple[list[Measurement], list[str]],
-) -> None:
+def test_measured_times_errors_work_and_memory(toy: tuple[list[Measurement], list[str]]) -> None:
     one = Measurement("one", cpu_s=(4.0, 8.0, 6.0))
     assert [one.seconds, one.spread] == pytest.approx([6.0, 1 / 3])
     found = errors({"u": np.array([3.0, 4.4]), "extra": np.ones(1)}, {"u": np.array([3.0, 4.0])})
@@ -172,8 +170,7 @@ def test_short_suites_are_chosen_and_every_one_can_be() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
-    [(["fig9"], "no such suite"), (["--core", "4096"], "no core 4096")],
+    ("arguments", "message"), [(["fig9"], "no such suite"), (["--core", "4096"], "no core 4096")]
 )
 def test_mistakes(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(arguments) == 2

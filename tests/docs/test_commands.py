@@ -72,9 +72,7 @@ class ReadError(Exception):
 
 
 @pytest.mark.parametrize(
-    "command",
-    [each for each in COMMANDS if is_stage(each)],
-    ids=lambda each: each.text[17:70],
+    "command", [each for each in COMMANDS if is_stage(each)], ids=lambda each: each.text[17:70]
 )
 def test_stages_know_their_options(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     read: Callable[..., Any] = argparse.ArgumentParser.parse_args

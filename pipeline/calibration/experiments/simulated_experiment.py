@@ -15,13 +15,7 @@ from pipeline.calibration.inputs import Constants
 from sim.core import Floats, Numbers
 from sim.quasistatics import StaticSolver
 from sim.scene import GradientChain, ParameterMap
-from sim.solvers import (
-    MotionLaw,
-    PrescribedMotion,
-    concrete,
-    differentiable_motion,
-    solve_cases,
-)
+from sim.solvers import MotionLaw, PrescribedMotion, concrete, differentiable_motion, solve_cases
 from sim.structure import Lattice, Material, Parameters, parameters, shape
 from sim.time_integration import ImplicitSolver, time_grid
 

@@ -15,12 +15,7 @@ from pipeline.fabrication.fixtures import (
     templates,
 )
 from pipeline.fabrication.parts import BuiltSpecimen, FlatPart, PrintedPart, unit_solid
-from pipeline.fabrication.plates import (
-    PrintEstimate,
-    estimate_print,
-    laser_sheets,
-    print_plates,
-)
+from pipeline.fabrication.plates import PrintEstimate, estimate_print, laser_sheets, print_plates
 from pipeline.problem import Problem
 
 

@@ -4,16 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.problem.fields import (
-    Angle,
-    Count,
-    Frequency,
-    Length,
-    Positive,
-    Ratio,
-    Section,
-    fault,
-)
+from pipeline.problem.fields import Angle, Count, Frequency, Length, Positive, Ratio, Section, fault
 from pipeline.problem.sections.regions import Region
 
 

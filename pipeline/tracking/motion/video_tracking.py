@@ -21,11 +21,7 @@ from pipeline.tracking.fit import ExposureBlur, PoseFitter, SideWalls, learn_tem
 from pipeline.tracking.frames import BrokenOffError, Frame
 from pipeline.tracking.geometry import SpecimenOutlines, arm_swing
 from pipeline.tracking.motion import uncertainty
-from pipeline.tracking.motion.camera_motion import (
-    camera_variance,
-    remove_camera_motion,
-    row_times,
-)
+from pipeline.tracking.motion.camera_motion import camera_variance, remove_camera_motion, row_times
 from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.motion_modes import count_at_rest

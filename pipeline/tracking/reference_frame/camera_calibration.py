@@ -14,13 +14,7 @@ from pipeline.tracking.fit import (
     block_places,
     outline_templates,
 )
-from pipeline.tracking.geometry import (
-    Camera,
-    Depth,
-    SpecimenOutlines,
-    estimate_depth,
-    fit_camera,
-)
+from pipeline.tracking.geometry import Camera, Depth, SpecimenOutlines, estimate_depth, fit_camera
 from sim.core import Floats, Mask
 
 BLURS = (0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 2.9)

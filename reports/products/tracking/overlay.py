@@ -11,12 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.runtime import UserError
 from pipeline.tracking.frames import Frame
-from pipeline.tracking.geometry import (
-    Camera,
-    SpecimenOutlines,
-    camera_of,
-    outlines_of_design,
-)
+from pipeline.tracking.geometry import Camera, SpecimenOutlines, camera_of, outlines_of_design
 from reports.base import style
 from sim.core import Floats, Image
 

@@ -28,9 +28,7 @@ def test_two_that_write_one_file_do_not_meet(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_what_a_killed_process_left_goes_and_what_a_living_one_writes_stays(
-    tmp_path: Path,
-) -> None:
+def test_what_a_killed_process_left_goes_and_what_a_living_one_writes_stays(tmp_path: Path) -> None:
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
     left, living = (tmp_path / f".part_{pid}_a[1].nc" for pid in (dead.pid, os.getppid()))
@@ -43,10 +41,7 @@ def test_what_a_killed_process_left_goes_and_what_a_living_one_writes_stays(
 
 def test_a_folder_that_is_a_file_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with (
-        refused("", file=tmp_path / "file/out.txt"),
-        write_atomically(tmp_path / "file/out.txt"),
-    ):
+    with refused("", file=tmp_path / "file/out.txt"), write_atomically(tmp_path / "file/out.txt"):
         pass
 
 

@@ -86,9 +86,7 @@ def sleeping(folder: Path) -> psutil.Process:
 
 
 @pytest.mark.usefixtures("server")
-def test_a_stage_has_streams_folder_environment_and_arguments_of_its_client(
-    folder: Path,
-) -> None:
+def test_a_stage_has_streams_folder_environment_and_arguments_of_its_client(folder: Path) -> None:
     each = [client(folder, *words) for words in (["3", "a b"], ["0"], ["segfault"])]
     ends = (3, "['3', 'a b']"), (0, "['0']"), (-signal.SIGSEGV, "")
     for process, (code, words) in zip(each, ends, strict=True):

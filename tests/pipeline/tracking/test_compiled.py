@@ -8,13 +8,7 @@ from types import ModuleType
 import pytest
 from numba.core.registry import CPUDispatcher
 
-MODULES = (
-    "compared_pixels",
-    "normal_equations",
-    "patch_correlation",
-    "template",
-    "template_cells",
-)
+MODULES = ("compared_pixels", "normal_equations", "patch_correlation", "template", "template_cells")
 NAMES = [*(f"pipeline.tracking.fit.{name}" for name in MODULES), "pipeline.virtual_lab.coverage"]
 
 

@@ -12,13 +12,7 @@ from matplotlib.patches import FancyArrowPatch
 from pipeline.comparison import middle_units
 from pipeline.posing import law_comparison
 from pipeline.problem import Output, void_units
-from pipeline.problem.sections import (
-    ForceDrive,
-    Paper,
-    RotationDrive,
-    TimeSeriesDrive,
-    TorqueDrive,
-)
+from pipeline.problem.sections import ForceDrive, Paper, RotationDrive, TimeSeriesDrive, TorqueDrive
 from reports.base import style
 from reports.facts import checks, fact_records, foil
 from reports.facts.copies import spreads

@@ -47,9 +47,7 @@ def mimicked() -> Scene:
 
 
 @pytest.mark.parametrize("place", [(0.1, 0.7, 0.95), (0.4, 1.0, 0.3)])
-def test_the_loss_in_scaled_time_is_that_of_the_load(
-    place: tuple[float, float, float],
-) -> None:
+def test_the_loss_in_scaled_time_is_that_of_the_load(place: tuple[float, float, float]) -> None:
     posed, at = scene(), np.array(place)
     design = design_of(posed)
     angle, amplitude, frequency = (float(number) for number in SHAKEN.numbers(at))

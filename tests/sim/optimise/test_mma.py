@@ -45,9 +45,7 @@ def test_failed_evaluations_bring_the_asymptotes_closer() -> None:
     np.testing.assert_allclose(found.x, known.optimum, atol=1e-2)
 
 
-def test_an_unsolved_subproblem_ends_with_the_best_design(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_unsolved_subproblem_ends_with_the_best_design(monkeypatch: pytest.MonkeyPatch) -> None:
     solved: list[Separable] = []
 
     def fragile(subproblem: Separable) -> tuple[np.ndarray, np.ndarray]:

@@ -14,10 +14,7 @@ from sim.optimise.quasi_newton import DAMPING, QuasiNewton
 from tests.sim.optimise import known_problems as problems
 
 EXACT = sim.SqpOptions(evaluations=150, retreats=0, residual=1e-6, progress=1e-9)
-OPTIONS: dict[Method, Any] = {
-    "sqp": EXACT,
-    "mma": sim.MmaOptions(evaluations=100, residual=1e-5),
-}
+OPTIONS: dict[Method, Any] = {"sqp": EXACT, "mma": sim.MmaOptions(evaluations=100, residual=1e-5)}
 KNOWN = {
     "rosenbrock": (problems.rosenbrock_in_disc(), {"sqp": 1e-5}),
     "corner": (problems.corner(), {"sqp": 1e-5, "mma": 1e-5}),
@@ -59,9 +56,7 @@ def test_hundreds_of_constraints(method: Method, size: tuple[int, int], accuracy
 
 
 @pytest.mark.parametrize("method", OPTIONS)
-def test_simulated_designs_are_feasible_and_seen_and_accepted_ones_improve(
-    method: Method,
-) -> None:
+def test_simulated_designs_are_feasible_and_seen_and_accepted_ones_improve(method: Method) -> None:
     known, seen = problems.corner(), list[Evaluation]()
     asked = (known.loss, known.constraints, known.start)
     found = minimise(method, *asked, options=OPTIONS[method], callback=seen.append)

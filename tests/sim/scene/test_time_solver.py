@@ -135,9 +135,7 @@ def test_the_gradient_is_that_of_the_loss_to_almost_all_digits(law: ContactModel
     assert slope == pytest.approx(central(value, 1e-4), rel=2e-7)
 
 
-def test_an_optimiser_checks_its_steps_at_start_and_end(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_an_optimiser_checks_its_steps_at_start_and_end(caplog: pytest.LogCaptureFixture) -> None:
     scene = posed(DRIVES["slow"], integrator="implicit")
     plan, limits = sim.make_plan(scene), sim.Limits(edge_length=5.0)
     with caplog.at_level(logging.INFO, "sim.scene.evaluation"):

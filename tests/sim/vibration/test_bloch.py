@@ -14,10 +14,7 @@ def made(lattice: Lattice, period: tuple[int, int]) -> UnitCell:
     return cell_of(lattice, VoidAngleContact(BARRIER, CUTOFF), at_rest(lattice), period)
 
 
-LATTICES = [
-    (rotating_squares(8), (2, 2)),
-    (kagome(8, 8, 15.0, 1.5, 1.0), (4, 2)),
-]
+LATTICES = [(rotating_squares(8), (2, 2)), (kagome(8, 8, 15.0, 1.5, 1.0), (4, 2))]
 
 
 @pytest.mark.parametrize(("lattice", "period"), LATTICES, ids=["quads", "kagome"])
