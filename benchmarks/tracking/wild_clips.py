@@ -142,7 +142,7 @@ def film(script: ClipScript, path: Path, frames: int | None = None) -> WildClip:
         visible,
         fault,
         script.keys,
-        _held(shown),
+        np.asarray(shown.centre[:, 1] < 1.0),
     )
 
 
@@ -153,10 +153,6 @@ def _in_view(shown: SpecimenOutlines, script: ClipScript, times: Floats, seen: M
     far = np.array(view.size) - 1 - reach[:, None]
     visible = np.asarray(((place > reach[:, None]) & (place < far)).all(axis=-1))
     return visible if script.hidden is None else visible & ~script.hidden(place, times)
-
-
-def _held(shown: SpecimenOutlines) -> Mask:
-    return np.asarray(shown.centre[:, 1] < 1.0)
 
 
 def _motions(shown: SpecimenOutlines, script: ClipScript) -> tuple[Motion, Motion]:

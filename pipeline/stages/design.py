@@ -66,7 +66,7 @@ def work(args: argparse.Namespace) -> None:
         _descend(posed, scene, plan, _kicked(start, number, posed, scene), args)
         for number, posed in enumerate(_seeded(asked, args.method))
     ]
-    made = design_dataset(asked, scene, min(results, key=_merit))
+    made = design_dataset(asked, scene, min(results, key=lambda each: (each.violation, each.loss)))
     parents = {} if args.start is None else {"start": args.start}
     found = plan.record() | {"descents": [each.loss for each in results]}
     origin = provenance.of_study(asked, "design", method=args.method, parents=parents, plan=found)
@@ -85,10 +85,6 @@ def _kicked(start: Floats | None, number: int, asked: Problem, scene: Scene) -> 
         return start
     kick, random = asked.optimiser.kick, np.random.default_rng([asked.optimiser.seed, number])
     return (0.0 if start is None else start) + random.uniform(-kick, kick, scene.space.n_variables)
-
-
-def _merit(result: Result) -> tuple[float, float]:
-    return result.violation, result.loss
 
 
 def _plan(scene: Scene, args: argparse.Namespace) -> Plan:

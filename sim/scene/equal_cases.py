@@ -47,7 +47,8 @@ def equal_cases(scene: Scene, vertices: Floats, values: ConcreteParameters) -> I
     if image is None or 3 * len(clamped) != len(loads.clamped):
         return every
     sets = (clamped, loads.driven, scene.objective.region)
-    if not (_keeps_constants(image, values) and all(_is_kept(image.unit, one) for one in sets)):
+    kept = all(np.array_equal(np.sort(image.unit[one]), np.sort(one)) for one in sets)
+    if not (kept and _keeps_constants(image, values)):
         return every
     first = every.copy()
     for case in every:
@@ -104,11 +105,6 @@ def _keeps_constants(image: NetworkImage, values: ConcreteParameters) -> bool:
     return np.allclose(
         values.vector[image.ligament], turned, rtol=0, atol=VERTEX_TOLERANCE
     ) and all(np.allclose(one, other, rtol=SAME, atol=0) for one, other in pairs)
-
-
-def _is_kept(image: Ints, units: Ints) -> bool:
-    """Checks that a set of units is mapped onto itself."""
-    return np.array_equal(np.sort(image[units]), np.sort(units))
 
 
 def _is_turned(one: PrescribedMotion, other: PrescribedMotion, image: NetworkImage) -> bool:

@@ -119,7 +119,8 @@ def smooth_drive(track: xr.Dataset, scene: Scene, bias: Floats) -> SmoothedDrive
     seen = _held_courses(track, held, scene, bias)
     places = np.flatnonzero(~held.assumed).tolist()
     most = max(1, int(_PART * len(seen.time)) - _DEGREE)
-    best = min(_powers_of_two(most), key=lambda count: _criterion(seen, places, count))
+    powers = [1 << k for k in range(most.bit_length())]
+    best = min(powers, key=lambda count: _criterion(seen, places, count))
     intervals = min(_FINER * best, most)
     value, slope = (np.zeros((intervals + 1, len(held.unit), 3)) for _ in range(2))
     changes: list[DriveChange] = []
@@ -149,10 +150,6 @@ def _held_courses(
     reach += np.nanmax(sigma, axis=(0, 1))
     time = track["time"].values - track["time"].values[0]
     return _HeldCourses(time, measured, sigma, there, bias, reach)
-
-
-def _powers_of_two(most: int) -> list[int]:
-    return [1 << k for k in range(most.bit_length())]
 
 
 def _criterion(seen: _HeldCourses, places: list[int], intervals: int) -> float:

@@ -60,7 +60,7 @@ def network(design: xr.Dataset, structure: str) -> UnitNetwork:
     there = np.flatnonzero(present)
     return UnitNetwork(
         tuple(ids[at] for at in there),
-        {ids[at]: _polygon(shapes[at]) for at in there},
+        {ids[at]: Polygon(shapes[at][np.isfinite(shapes[at]).all(axis=1)]) for at in there},
         {ids[at]: names[at] for at in there},
         {ids[at]: index[at] for at in there},
         tuple(joints),
@@ -78,23 +78,16 @@ def _flagged(variable: xr.DataArray, meaning: str) -> NDArray[np.bool_]:
     return np.asarray(variable.values == variable.attrs["flag_values"][meanings.index(meaning)])
 
 
-def _polygon(points: Floats) -> Polygon:
-    return Polygon(points[np.isfinite(points).all(axis=1)])
-
-
 def corners(net: UnitNetwork) -> dict[int, list[Corner]]:
     """Lists the vertices that take a slot, by id of the unit."""
     slotted: dict[int, list[Corner]] = defaultdict(list)
     for number, (a, p), (b, q), along in net.ligaments:
-        length = float(shapely.distance(*(_vertex(net, *end) for end in ((a, p), (b, q)))))
+        ends = (net.polygons[unit].exterior.coords[end] for unit, end in ((a, p), (b, q)))
+        length = float(shapely.distance(*map(shapely.Point, ends)))
         turns = net.turns.get(number, (None, None))
         slotted[a].append(Corner(p, number, -along, length, turns[0]))
         slotted[b].append(Corner(q, number, along, length, turns[1]))
     return slotted
-
-
-def _vertex(net: UnitNetwork, unit: int, vertex: int) -> shapely.Point:
-    return shapely.Point(net.polygons[unit].exterior.coords[vertex])
 
 
 def refuse_overlaps(net: UnitNetwork, file: Path) -> None:

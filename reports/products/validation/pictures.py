@@ -54,7 +54,8 @@ def draw_pictures(made: xr.Dataset, asked: KnownPictures, folder: Path) -> Figur
     pictures = sorted((folder / parts.folder).glob("*.png"))
     frames = made["frame"].values
     shown = [path for frame in frames[at] for path in pictures if path.stem.endswith(str(frame))]
-    reach = _reach(np.concatenate(outlines))
+    points = np.concatenate(outlines)
+    reach = points.min(axis=0) - _ABOUT, points.max(axis=0) + _ABOUT
     style.letter(drawn, 2.0, 1.0, "a", "At rest, and tracked")
     for k, path in enumerate([folder / parts.folder / parts.first, *shown]):
         axes = style.place(drawn, 2.0 + 43.5 * k, 8.0, 42.0, 60.0)
@@ -71,10 +72,6 @@ def draw_pictures(made: xr.Dataset, asked: KnownPictures, folder: Path) -> Figur
     axes = style.place(drawn, 28.0, 124.0, 124.0, 80.0)
     _specimen(axes, made, read_picture(folder / asked.specimen.file))
     return drawn
-
-
-def _reach(points: Floats) -> tuple[Floats, Floats]:
-    return points.min(axis=0) - _ABOUT, points.max(axis=0) + _ABOUT
 
 
 def _moved(outline: Floats, centre: Floats, motion: Floats) -> Floats:
