@@ -25,6 +25,7 @@ from benchmarks.harness import (
 from benchmarks.suites import suites
 from pipeline import datasets
 from tests.benchmarks import toy_benchmark
+from tests.tables import cases
 
 ABOUT = {"processor": "abacus", "core": 0, "commit": "0123456789abcdef"}
 ABOUT |= {"date": "2026-01-01T00:00", "changed_since_commit": []}
@@ -179,14 +180,7 @@ def test_mistakes(arguments: list[str], message: str, capsys: pytest.CaptureFixt
     assert "Traceback" not in told
 
 
-@pytest.mark.parametrize(
-    ("seconds", "error", "lines"),
-    [
-        (2.2, 1.1e-3, []),
-        (2.4, 1e-3, ["coarse: slower, 1.20 times the time"]),
-        (1.0, 2e-3, ["coarse: loss less accurate, 2.00 times the error"]),
-    ],
-)
+@cases("benchmarks", "seconds, error, lines")
 def test_more_than_15_percent_is_told(seconds: float, error: float, lines: list[str]) -> None:
     before = recorded(1.0, 1e-3, yard=0.5)
     # the second machine is half as fast: its seconds are twice as many

@@ -12,6 +12,7 @@ from pipeline.fabrication.readback import Curve, Drawing, read_drawing
 from pipeline.problem.sections import Laser
 from pipeline.runtime import UserError
 from tests.pipeline.fabrication.files import rectangle, sheet, stroke, write_dxf, write_svg
+from tests.tables import cases
 
 SIZE = (100.0, 60.0)
 LASER = Laser.model_construct(kerf=0.2, sheet=SIZE, margin=5.0, gap=2.0, template_thickness=1.5)
@@ -133,14 +134,7 @@ def test_other_ids_units_colours_and_text_are_caught(tmp_path: Path) -> None:
     assert any("a TEXT on layer" in words for words in found(read_drawing(path)))
 
 
-@pytest.mark.parametrize(
-    "head",
-    [
-        'width="100" height="60" viewBox="0 0 100 60"',
-        'width="100mm" height="60mm" viewBox="0 0 1000 600"',
-        'width="100mm" height="60mm"',
-    ],
-)
+@cases("fabrication", "head")
 def test_an_svg_of_another_scale_is_caught(tmp_path: Path, head: str) -> None:
     drawing = read_drawing(write_svg(tmp_path / "sheet.svg", sheet(), SIZE, head))
     assert any("the page does not say" in words for words in found(drawing))

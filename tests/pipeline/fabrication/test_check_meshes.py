@@ -18,6 +18,7 @@ from sim.core import Floats, Ints
 from tests.pipeline.fabrication import handmade
 from tests.pipeline.fabrication.files import write_3mf, write_stl
 from tests.pipeline.fabrication.handmade import ASKED
+from tests.tables import cases
 
 Mesh = tuple[Floats, Ints]
 PRINT = Print()
@@ -177,18 +178,10 @@ def plate_faults(path: Path) -> list[str]:
     return [f"{fault.part}: {fault.what}" for fault in check_plate(read_3mf(path), PRINT)]
 
 
-@pytest.mark.parametrize(
-    ("place", "expected"),
-    [
-        ((19.3, 20.0), "part A1: 1.938 mm from part B1"),
-        ((5.0, 20.0), "part A1: 0.000 mm from part B1"),
-        ((22.0, 1.0), "part B1: it does not stand on the bed"),
-        ((226.0, 20.0), "part B1: it does not stand on the bed"),
-    ],
-)
-def test_a_misplaced_part_fails(tmp_path: Path, place: tuple[float, float], expected: str) -> None:
+@cases("fabrication", "x, y, expected")
+def test_a_misplaced_part_fails(tmp_path: Path, x: float, y: float, expected: str) -> None:
     bodies, places = plate()
-    found = plate_faults(write_3mf(tmp_path / "plate.3mf", bodies, places | {"B1": place}))
+    found = plate_faults(write_3mf(tmp_path / "plate.3mf", bodies, places | {"B1": (x, y)}))
     assert any(words.startswith(expected) for words in found), found
 
 

@@ -27,7 +27,7 @@ from pipeline.problem.sections import Fabrication
 from pipeline.runtime import UserError
 from tests.pipeline.fabrication import built
 from tests.pipeline.fabrication.files import write_stl
-from tests.tables import tables
+from tests.tables import cases, tables
 
 UNITS = "laser/units_sheet1_nominal"
 KERF = "laser/units_sheet1_kerf0.15"
@@ -169,16 +169,6 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "pins": (edited("bom.csv", "pin,PIN1.5,12", "pin,PIN1.5,11"), "11 pins for 12 holes"),
 }
 
-OTHERS: dict[str, tuple[dict[str, object], str]] = {
-    "fewer tabs": ({"shims": {"tabs": {"count": 3}}}, "part S8.25: 2 tabs instead of 3"),
-    "no tabs": ({"shims": {"tabs": None}}, "part S8.25: 2 tabs instead of 0"),
-    "wide tabs": ({"shims": {"tabs": {"width": 0.5}}}, "a tab 0.400 mm wide instead of 0.5 mm"),
-    "tabs": ({"slots": {"depth_min": 0.6}}, "a tab that is not on a long edge, within the slots"),
-    "pins": ({"laser": {"pin": 1.6}}, "a hole of 1.500 mm for pins of 1.6 mm"),
-    "thick layers": ({"laser": {"aspect_ratio": 4.1}}, "a hole 1.50 mm wide in material of 1.62"),
-}
-"""Packages made with the defaults, checked against other settings."""
-
 
 def test_a_package_passes_as_it_is_written(whole: tuple[Path, Problem]) -> None:
     check(*whole)
@@ -192,9 +182,10 @@ def test_a_damaged_package_fails(package: Path, whole: tuple[Path, Problem], nam
     assert expected in refused(package, whole[1])
 
 
-@pytest.mark.parametrize("name", OTHERS)
-def test_a_package_of_other_tabs_or_pins_is_refused(whole: tuple[Path, Problem], name: str) -> None:
-    given, expected = OTHERS[name]
+@cases("fabrication", "given, expected")
+def test_a_package_of_other_settings_is_refused(
+    whole: tuple[Path, Problem], given: dict[str, object], expected: str
+) -> None:
     asked = Fabrication.model_validate(given, context=SIM_UNITS)
     with pytest.raises(UserError) as raised:
         check(whole[0], whole[1].model_copy(update={"fabrication": asked}))

@@ -15,6 +15,7 @@ from sim.quasistatics import StaticSolver
 from sim.solvers import differentiable_motion, solve_case
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 from tests.sim.structures import central
+from tests.tables import cases
 
 ANGLES = np.deg2rad([0.0, 45.0, 90.0, 135.0])
 NEGLIGIBLE = 1e-12
@@ -172,17 +173,7 @@ def test_the_evaluator_is_the_derivative_of_the_losses() -> None:
     assert relative(gradient, np.asarray(by_jax)) < NEGLIGIBLE
 
 
-@pytest.mark.parametrize(
-    ("changes", "integrator"),
-    [
-        ({}, "implicit"),
-        ({"frequency": 400.0}, "explicit"),
-        ({"accuracy": "tight"}, "explicit"),
-        ({"frequency": 400.0, "integrator": "implicit", "duration": 0.01}, "implicit"),
-        ({"integrator": "explicit"}, "explicit"),
-        ({"static": True, "frequency": None}, "static"),
-    ],
-)
+@cases("sim", "changes, integrator")
 def test_integrators_fit_the_scene_or_are_chosen(changes: dict[str, Any], integrator: str) -> None:
     plan = sim.make_plan(scene(**changes))
     assert plan.integrator == integrator

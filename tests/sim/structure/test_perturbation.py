@@ -5,6 +5,7 @@ import shapely
 from sim import structure
 from sim.structure.gaps import polygons
 from sim.structure.perturbation import clashing_units
+from tests.tables import cases
 
 LATTICE = structure.quads(5, 4, 15.0, 2.25, np.deg2rad(20.0))
 CUTOFF = np.deg2rad(-10.0)
@@ -82,14 +83,7 @@ def test_every_ligament_gets_stiffnesses_of_its_own() -> None:
     np.testing.assert_array_equal(made[0].damping_rotation, 0.2)
 
 
-@pytest.mark.parametrize(
-    ("kind", "name", "count"),
-    [
-        ("stiffness", "axial_stiffness", 1),
-        ("units", "damping_rotation", 20),
-        ("damping", "damping_rotation", 1),
-    ],
-)
+@cases("sim", "kind, name, count")
 def test_other_constants_vary_together_or_by_unit(kind: str, name: str, count: int) -> None:
     made = drawn(0, **{kind: 0.1}).material  # type: ignore[arg-type]
     assert len(np.unique(getattr(made, name))) == count
