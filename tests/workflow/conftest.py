@@ -13,22 +13,10 @@ import pytest
 
 from pipeline.runtime import ROOT
 
-STAGES = (
-    "pipeline/stages/design",
-    "pipeline/stages/select",
-    "pipeline/stages/simulate",
-    "pipeline/stages/as_built",
-    "pipeline/stages/virtual_specimen",
-    "pipeline/stages/sweep",
-    "pipeline/stages/monte_carlo",
-    "pipeline/stages/verify",
-    "pipeline/stages/redesign",
-    "pipeline/stages/film",
-    "pipeline/stages/track",
-    "pipeline/stages/compare",
-    "reports/__main__",
-)
-
+STAGES = """
+design select simulate as_built virtual_specimen sweep monte_carlo verify redesign
+film track compare
+"""
 
 SERVER = """
 import os, sys
@@ -125,6 +113,6 @@ def _copied(root: Path) -> Sandbox:
     for folder in ("benchmarks", "experiments", "pipeline", "profiles", "reports", "sim"):
         shutil.copytree(ROOT / folder, root / folder, ignore=shutil.ignore_patterns("*.pyc.*"))
     shutil.copy(ROOT / "Snakefile", root)
-    for stage in STAGES:
+    for stage in (*(f"pipeline/stages/{name}" for name in STAGES.split()), "reports/__main__"):
         shutil.copy(Path(__file__).with_name("toy_stage.py"), root / f"{stage}.py")
     return Sandbox(root)

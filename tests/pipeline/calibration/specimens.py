@@ -4,31 +4,23 @@ import json
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from pipeline.__main__ import run_stage
 from pipeline.calibration.inputs import Calibration
 from pipeline.problem.reading import load_section
 
-TRUTH = {
-    "density": "6.18 kg/m^2",
-    "axial_stiffness": "120 N/mm",
-    "shear_stiffness": "1.19 N/mm",
-    "bending_stiffness": "1.5 N mm/rad",
-    "damping": {"ratio": 0.0186},
-}
-START = TRUTH | {
-    "axial_stiffness": "100 N/mm",
-    "shear_stiffness": "1.0 N/mm",
-    "bending_stiffness": "1.8 N mm/rad",
-    "damping": {"ratio": 0.015},
-}
-LATTICE = {
-    "columns": 3,
-    "rows": 4,
-    "spacing": "15 mm",
-    "ligament_length": "2.25 mm",
-    "bias_angle": "-20 deg",
-}
-ENDS = {"tension": "1.05 mm", "compression": "3.0 mm", "shear": "3.0 mm"}
+TRUTH, START, LATTICE, ENDS = yaml.safe_load_all("""
+{ density: 6.18 kg/m^2, axial_stiffness: 120 N/mm, shear_stiffness: 1.19 N/mm,
+  bending_stiffness: 1.5 N mm/rad, damping: { ratio: 0.0186 } }
+--- # of a fit
+{ density: 6.18 kg/m^2, axial_stiffness: 100 N/mm, shear_stiffness: 1.0 N/mm,
+  bending_stiffness: 1.8 N mm/rad, damping: { ratio: 0.015 } }
+---
+{ columns: 3, rows: 4, spacing: 15 mm, ligament_length: 2.25 mm, bias_angle: -20 deg }
+---
+{ tension: 1.05 mm, compression: 3.0 mm, shear: 3.0 mm }
+""")
 STIFFNESS = ["axial_stiffness", "shear_stiffness", "bending_stiffness"]
 
 

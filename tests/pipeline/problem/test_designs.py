@@ -2,7 +2,6 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.__main__ import run_stage
 from pipeline.problem import content_hash, section_hash
 from pipeline.problem.reading import load
 from pipeline.problem.sections import design_name
@@ -10,6 +9,7 @@ from pipeline.problem.sections.designs import split_name
 from pipeline.runtime import ROOT
 from pipeline.workflow.studies import Study, families, together
 from tests.pipeline import static
+from tests.pipeline.conftest import Failing
 from tests.tables import refused
 
 FIG3 = ROOT / "experiments/fig3/problem.yaml"
@@ -52,8 +52,7 @@ def test_the_workflow_knows_them() -> None:
     assert [str(study) for study in together()["fig3"]] == ["fig3@1", "fig3@2", "fig3@3", "fig3@4"]
 
 
-def test_one_of_several_has_to_be_named(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_one_of_several_has_to_be_named(tmp_path: Path, failing: Failing) -> None:
     path = static.write(tmp_path, static.HOLE + TWO)
     words = ["--problem", str(path), "--method", "sqp", "--out", str(tmp_path / "x.nc")]
-    assert run_stage("design", words) == 2
-    assert "--preset 1" in capfd.readouterr().err
+    assert "--preset 1" in failing("design", words)

@@ -15,11 +15,7 @@ from tests.pipeline import static
 from tests.reports.conftest import Failing
 
 CURVE = "sweep: { grid: { drive.amplitude: { from: 1 mm, to: 3 mm, points: 5 } } }"
-MAP = """sweep:
-  grid:
-    drive.amplitude: [1 mm, 2 mm, 3 mm]
-    contact.law: [angle, distance]
-"""
+MAP = "sweep: { grid: { drive.amplitude: [1 mm, 2 mm, 3 mm], contact.law: [angle, distance] } }"
 RANDOM = """sweep:
   random:
     drive.amplitude: { from: 1 mm, to: 3 mm }

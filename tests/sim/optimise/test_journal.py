@@ -111,9 +111,7 @@ def test_interrupted_runs_resume_in_place(tmp_path: Path, method: Method, dies_a
     assert (tmp_path / "killed").read_bytes() == (tmp_path / "whole").read_bytes()
 
 
-def test_a_journal_of_another_problem_or_a_foreign_file_is_started_anew(
-    complete: Complete, tmp_path: Path
-) -> None:
+def test_a_foreign_journal_is_started_anew(complete: Complete, tmp_path: Path) -> None:
     data, _, calls = complete
     (tmp_path / "run").write_bytes(data)
     loss = Counted()
