@@ -1,5 +1,3 @@
-"""Drives the report's page in headless Chromium, as a reader would."""
-
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""A page with recordings, and the index over pages, in headless Chromium."""
-
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,3 @@
-"""A lab's video and YAML in the folder of recordings take the place of the virtual one there."""
-
 import shutil
 from pathlib import Path
 

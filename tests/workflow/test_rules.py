@@ -1,5 +1,3 @@
-"""What the workflow plans, what it reruns after an edit, and what it says to a faulty problem."""
-
 import errno
 import os
 import shutil

@@ -1,5 +1,3 @@
-"""What a killed run left on a cluster, with stand-ins for the commands of SLURM."""
-
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,3 @@
-"""A mistake in a calibration or in its files is told in one message, and nothing is written."""
-
 from pathlib import Path
 
 import numpy as np

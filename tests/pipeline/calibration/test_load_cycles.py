@@ -1,5 +1,3 @@
-"""Records of a testing machine are split into branches; snaps, loops and equilibria are found."""
-
 import time
 from pathlib import Path
 

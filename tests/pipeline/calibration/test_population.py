@@ -1,5 +1,3 @@
-"""Several samples are fitted as a population, and the band of a new one is honest."""
-
 from collections.abc import Mapping
 from pathlib import Path
 

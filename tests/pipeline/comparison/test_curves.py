@@ -1,5 +1,3 @@
-"""What is followed along a recording, by hand, and how often its intervals hold the truth."""
-
 from functools import partial
 
 import numpy as np

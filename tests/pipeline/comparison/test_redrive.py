@@ -1,5 +1,3 @@
-"""A simulation that is driven by a track does what the specimen did."""
-
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,3 @@
-"""Files of every kind keep the CF conventions, and those of the first version are still read."""
-
 import re
 import subprocess
 import sys

@@ -1,5 +1,3 @@
-"""Shims in slots that are not in line: how they are bent, and that slots are chosen against it."""
-
 import json
 from dataclasses import replace
 from pathlib import Path

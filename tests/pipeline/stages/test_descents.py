@@ -1,5 +1,3 @@
-"""Designs for contact on distance: by the angle law first, and the best of several descents."""
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,3 @@
-"""Specimens of the virtual lab: off their design by what is asked for, and by nothing else."""
-
 from pathlib import Path
 
 import numpy as np

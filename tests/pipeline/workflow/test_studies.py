@@ -1,5 +1,3 @@
-"""Names of studies and presets that would be those of other targets."""
-
 from pathlib import Path
 
 import pytest

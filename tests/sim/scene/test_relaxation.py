@@ -1,5 +1,3 @@
-"""Ligaments under stress at rest: their energy, their equilibrium, its derivatives."""
-
 from typing import Literal
 
 import jax.numpy as jnp

@@ -1,5 +1,3 @@
-"""Scenes without a meaning are refused in one sentence; what may be meant is warned of."""
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,5 +1,3 @@
-"""A killed optimisation with paths to start from resumes to the same bytes."""
-
 from functools import cache
 from pathlib import Path
 
