@@ -9,11 +9,7 @@ from sim.core import Floats, Ints
 from sim.structure import Lattice, design_space
 
 LIMITS = Limits(
-    edge_length=3.0,
-    block_angle=float(np.deg2rad(30.0)),
-    convex=True,
-    void_angle=0.0,
-    gap=0.2,
+    edge_length=3.0, block_angle=float(np.deg2rad(30.0)), convex=True, void_angle=0.0, gap=0.2
 )
 """The loosest that a study of the paper has."""
 MOST_CUTS = 2000

@@ -83,10 +83,7 @@ def inertia(name: str, skipped: float, _: Task) -> Run:
     (ramp,) = scene.loads.motions
     assert isinstance(ramp, LinearRamp)
     slow = scene.driven_by(
-        ramp._replace(duration=SLOWLY),
-        static=False,
-        duration=SLOWLY,
-        integrator="implicit",
+        ramp._replace(duration=SLOWLY), static=False, duration=SLOWLY, integrator="implicit"
     )
     plan = make_plan(scene if skipped else slow)
     posed = load_cases.LoadCase(scene if skipped else slow, load_cases.case(name).target)

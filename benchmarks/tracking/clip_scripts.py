@@ -22,37 +22,24 @@ _SKIN = 140.0
 
 
 class ClipScript(NamedTuple):
-    """Scripts a clip: motions of specimen and camera, the view, things beside.
+    """Scripts a clip: motions of specimen and camera, the view, things beside."""
 
-    Attributes:
-        shift: (n, 2) of the whole, mm, at times (n,) in s.
-        turn: (n,) of the whole about its middle, rad, likewise.
-        pace: (n,) of the specimen's own motion, from 0 to 1.
-        view: how it is seen.
-        cover: what else is in view.
-        hidden: which units (n, units) at places (n, units, 2) in px these hide, at times.
-        times: (frames,) at which frames are taken, s.
-        stamps: what the file says of them, if it is something else.
-        fault: frames before which some are missing, or that show the one before again.
-        film: codec, pixel format and crf.
-        follows: whether the camera's motion is to be taken out.
-        keys: of the recording.
-        grid: the specimen's lattice.
-    """
-
+    # (n, 2) of the whole, mm, and (n,) about its middle, rad, at times (n,) in s
     shift: Callable[[Floats], Floats] | None = None
     turn: Callable[[Floats], Floats] | None = None
+    # (n,) of the specimen's own motion, from 0 to 1
     pace: Callable[[Floats], Floats] = lambda time: np.sin(2.4 * time) ** 2
     view: View = View()
-    cover: Covering | None = None
+    cover: Covering | None = None  # what else is in view
+    # which units (n, units) at places (n, units, 2) in px these hide, at times
     hidden: Callable[[Floats, Floats], Mask] | None = None
-    times: Floats = np.arange(24) / RATE
-    stamps: Floats | None = None
-    fault: tuple[int, ...] = ()
-    film: tuple[str, str, int] | None = None
-    follows: bool = False
-    keys: Mapping[str, Any] = MappingProxyType({})
-    grid: Mapping[str, Any] = MappingProxyType(GRID)
+    times: Floats = np.arange(24) / RATE  # (frames,) at which frames are taken, s
+    stamps: Floats | None = None  # what the file says of them, if it is something else
+    fault: tuple[int, ...] = ()  # frames before which some are missing, or that show one again
+    film: tuple[str, str, int] | None = None  # codec, pixel format and crf
+    follows: bool = False  # whether the camera's motion is to be taken out
+    keys: Mapping[str, Any] = MappingProxyType({})  # of the recording
+    grid: Mapping[str, Any] = MappingProxyType(GRID)  # the specimen's lattice
 
 
 def _glide(length: float, there: float) -> Callable[[Floats], Floats]:
@@ -64,15 +51,8 @@ def _glide(length: float, there: float) -> Callable[[Floats], Floats]:
 
 def _hand(image: Singles, time: float) -> None:
     reach = float(_hand_reach(np.array(time)))
-    points = [
-        (0, 0),
-        (reach, 60),
-        (reach + 45, 200),
-        (reach + 20, 330),
-        (reach + 50, 480),
-        (reach, 640),
-        (0, 640),
-    ]
+    edge = [(0, 60), (45, 200), (20, 330), (50, 480), (0, 640)]
+    points = [(0, 0), *((reach + x, y) for x, y in edge), (0, 640)]
     cv2.fillPoly(image, [np.array(points, np.int32) + np.array([9, 7], np.int32)], 80.0)
     cv2.fillPoly(image, [np.array(points, np.int32)], _SKIN)
     for at in range(0, int(reach), 23):

@@ -21,13 +21,9 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: a fault of the files.
     """
+    parts = {"samples": _samples, "constants": _constants, "cycles": _cycles, "pictures": _pictures}
     try:
-        {
-            "samples": _samples,
-            "constants": _constants,
-            "cycles": _cycles,
-            "pictures": _pictures,
-        }[args.command](args)
+        parts[args.command](args)
     except SimulationError as error:
         raise simulation_fault(error, args.file) from error
 

@@ -65,15 +65,12 @@ class Approximation:
 
     Svanberg's constraints read f <= 0, so f = -c. A constraint is stiffened only in the variables
     that it depends on, which keeps it sparse.
-
-    Attributes:
-        stiffness: (1 + m,) weight of the added convex term of each function.
     """
 
     def __init__(self, point: EvaluatedPoint, distance: Floats, stiffness: Floats) -> None:
         self.point = point
         self.distance = distance
-        self.stiffness = stiffness
+        self.stiffness = stiffness  # (1 + m,) weight of the added convex term of each function
         self.slopes = sp.csr_array(sp.vstack([point.gradient[None], -point.jacobian]))
         self.slopes.eliminate_zeros()
 

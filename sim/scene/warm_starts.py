@@ -73,8 +73,7 @@ def _records(path: Path) -> list[StaticRecord]:
         parts = {name: stored[name] for name in _KEPT}
     return [
         StaticRecord(
-            **{name: part[case] for name, part in parts.items()},
-            counts=np.zeros(4, dtype=np.int64),
+            **{name: part[case] for name, part in parts.items()}, counts=np.zeros(4, dtype=np.int64)
         )
         for case in range(len(parts["states"]))
     ]

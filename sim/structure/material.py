@@ -61,7 +61,4 @@ def damping_of_ratio(
     """
     mass, inertia = unrotated_inertia(density, spacing)
     # c = 2 ratio sqrt(m k), and likewise of the rotation
-    return (
-        ratio * 2.0 * math.sqrt(mass * shear),
-        ratio * 2.0 * math.sqrt(inertia * bending),
-    )
+    return ratio * 2.0 * math.sqrt(mass * shear), ratio * 2.0 * math.sqrt(inertia * bending)

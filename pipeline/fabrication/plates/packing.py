@@ -21,11 +21,7 @@ class Spot(NamedTuple):
 
 
 class TooLargeError(ValueError):
-    """Reports a part that is larger than the room on a sheet.
-
-    Attributes:
-        part: its place in the sequence of parts.
-    """
+    """Reports a part, by its place in the sequence, that is larger than the room on a sheet."""
 
     def __init__(self, part: int) -> None:
         super().__init__(f"part {part} is larger than a sheet")

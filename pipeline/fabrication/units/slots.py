@@ -29,17 +29,12 @@ _HAIR = 1e-6  # mm
 
 
 class NoRoomError(ValueError):
-    """Reports that the walls around the slots of a unit cannot be thick enough.
-
-    Attributes:
-        vertex: the corner where no slot at all fits, None if they only do not fit together.
-        wall: thickest walls possible there, mm.
-    """
+    """Reports that the walls around the slots of a unit cannot be thick enough."""
 
     def __init__(self, vertex: int | None, wall: float) -> None:
         super().__init__(f"no room for a slot at vertex {vertex}")
-        self.vertex = vertex
-        self.wall = wall
+        self.vertex = vertex  # where no slot at all fits; None if they only do not fit together
+        self.wall = wall  # thickest walls possible there, mm
 
 
 def place_slots(

@@ -61,11 +61,7 @@ def wave_figure(study: StudyResults) -> PanelFigure:
             _PROSE["d"],
             [Table("waves.csv", "every structure over time (panels d to f)", _over_time(study))],
         ),
-        Panel(
-            ("e", "Mimicking error", 0.0, low),
-            error,
-            _PROSE["e"],
-        ),
+        Panel(("e", "Mimicking error", 0.0, low), error, _PROSE["e"]),
         Panel(
             ("f", "Smallest void angle along the top and bottom edges", half, low),
             lambda figure: _edges(

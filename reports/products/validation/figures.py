@@ -72,10 +72,7 @@ def _prediction(axes: Axes, made: xr.Dataset) -> None:
 
 def _residual(axes: Axes, made: xr.Dataset) -> None:
     x, measured = made["displacement"].values, made["measured"].values
-    for name, line, colour in (
-        ("median", "-", style.CLOAKED),
-        ("simulated", "--", style.ALTERED),
-    ):
+    for name, line, colour in (("median", "-", style.CLOAKED), ("simulated", "--", style.ALTERED)):
         axes.plot(x, 100 * (made[name].values / measured - 1), line, color=colour)
     axes.axhline(0, color=style.INTACT, linewidth=0.5)
     label = "% of the measured force"
