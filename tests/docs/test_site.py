@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import pytest
 
 from pipeline.runtime import ROOT
@@ -52,6 +53,7 @@ def check_numbers(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     found = {key: float(made[key]) for key in PINNED[name]}
     assert found == pytest.approx(PINNED[name], rel=1e-3, abs=1e-9)
     assert made["figure"].axes
+    plt.close("all")
 
 
 @pytest.mark.parametrize("name", NAMES)
