@@ -3,7 +3,7 @@
 import numpy as np
 
 from pipeline.tracking.frames import has_uneven_intervals
-from sim.core import Floats, Ints, Mask
+from sim.core import Floats, Ints, Mask, Reals
 
 STEADY, DUPLICATE, DROPPED = range(3)
 """Timing of a frame: as the file says; shows the instant before again; a frame is missing."""
@@ -31,7 +31,7 @@ _BETTER = 0.2
 """A gap must make the squared residuals of smooth motion so much smaller."""
 
 
-def timing_faults(time: Floats, motion: Floats, sigma: Floats, same: Mask) -> Ints:
+def timing_faults(time: Floats, motion: Reals, sigma: Reals, same: Mask) -> Ints:
     """Classifies the timing (frames,) of every frame.
 
     A frame that repeats the one before is the same in its pixels. A gap stands in the stamps, or
@@ -44,7 +44,7 @@ def timing_faults(time: Floats, motion: Floats, sigma: Floats, same: Mask) -> In
         sigma: (frames, units, 3) standard uncertainties.
         same: (frames,) whether the picture is that of the frame before.
     """
-    place = motion[..., :2]
+    place = motion[..., :2].astype(float)
     noise = np.array(
         [np.nanmedian(told) if np.isfinite(told).any() else np.inf for told in sigma[..., :2]]
     )

@@ -131,10 +131,10 @@ def track_video(
                 " in the first frame",
                 100 * unsure.mean(),
             )
-    motion = _since_rest(motion, rest, offset)
+    _count_from_rest(motion, rest, offset)
     remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     qualities[np.isnan(motion[..., 0]) & (qualities == GOOD)] = HIDDEN  # as the supports are
-    faults = timing_faults(time, motion.astype(float), sigmas.astype(float), same)
+    faults = timing_faults(time, motion, sigmas, same)
     steady = faults != DUPLICATE
     later = likeness[1:][np.isfinite(likeness[1:])]
     coded = not len(later) or float(np.median(later)) > _CODED
@@ -167,16 +167,15 @@ def _exposure(tracker: Tracker, motion: Reals, times: Floats) -> float:
     return float(np.nanmedian(found)) if np.isfinite(found).any() else tracker.exposure
 
 
-def _since_rest(motion: Reals, count: int, offset: Singles) -> Reals:
-    """Returns motions (frames, units, 3) from the mean of the first frames on.
+def _count_from_rest(motion: Reals, count: int, offset: Singles) -> None:
+    """Counts motions (frames, units, 3), in place, from the mean of the first frames on.
 
     What the middles swing about the design's places, offset (units, 2), is added.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # some units are not seen at rest
-        motion = motion - np.nan_to_num(np.nanmean(motion[:count], axis=0))
+        motion -= np.nan_to_num(np.nanmean(motion[:count], axis=0))
     motion[..., :2] += arm_swing(motion[..., 2], offset)
-    return motion
 
 
 def _centre_offset(
