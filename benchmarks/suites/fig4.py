@@ -30,12 +30,13 @@ OURS, THEIRS = "ours", "pseudo-dynamics, diffrax Dopri5"
 def suite() -> Suite:
     """Makes the suite."""
     theirs = partial(Method, own=False, baseline=True)
+    strict = partial(_equilibrium, np.linspace(0.0, 1.0, 26)[1:], 1e-12)
     return in_turn(
         "fig4",
         "strain energy of a region and its gradient at the final load, 15 x 15 units",
-        ("the same equilibrium by 25 loads, each to a hundredth of the usual residual", _strict),
+        ("the same equilibrium by 25 loads, each to a hundredth of the usual residual", strict),
         (
-            Method(OURS, _ours),
+            Method(OURS, partial(_equilibrium, np.ones(1), 1e-10)),
             theirs(THEIRS, partial(_dynamics, "gradient"), repeats=1),
             theirs("pseudo-dynamics, loss only", partial(_dynamics, "loss"), repeats=2),
         ),
@@ -47,15 +48,6 @@ def suite() -> Suite:
         ),
         225,
     )
-
-
-def _strict() -> Run:
-    """Solves for the same equilibrium by 25 loads, each to a hundredth of the usual residual."""
-    return _equilibrium(np.linspace(0.0, 1.0, 26)[1:], 1e-12)
-
-
-def _ours() -> Run:
-    return _equilibrium(np.ones(1), 1e-10)
 
 
 def _equilibrium(loads: Floats, relative: float) -> Run:

@@ -53,7 +53,7 @@ def _variable_faults(found: xr.Variable, name: str, table: Variable) -> Iterator
         yield SchemaFault(f"its dims are not {_tuple(table.dims)}", name, _tuple(found.dims))
     elif found.dtype.kind not in _KINDS[table.dtype]:
         yield SchemaFault(f"its type is not {table.dtype}", name, str(found.dtype))
-    elif not _known_units(units := _units(found, table), table):
+    elif not _known_units(units := found.attrs.get(table.unit_attribute, table.units), table):
         yield SchemaFault(f"its unit is not {table.units!r}", name, units)
     else:
         yield from _value_faults(found.values, name, table)
@@ -61,11 +61,6 @@ def _variable_faults(found: xr.Variable, name: str, table: Variable) -> Iterator
 
 def _known_units(told: object, table: Variable) -> bool:
     return isinstance(told, str) and told in (table.units, *table.also)  # a list may be told
-
-
-def _units(found: xr.Variable, table: Variable) -> object:
-    """Reads the unit; that of the table where there is none, as before it is written."""
-    return found.attrs.get(table.unit_attribute, table.units)
 
 
 def _value_faults(values: np.ndarray, name: str, table: Variable) -> Iterator[SchemaFault]:

@@ -60,7 +60,7 @@ class Progress:
     def update(self, steps: int = 1, **figures: float | str) -> None:
         """Count `steps` more and tell of them if it is time; `figures` are shown behind."""
         self._done += steps
-        told = {name: _figure(value) for name, value in figures.items()}
+        told = {name: x if isinstance(x, str) else f"{x:.4g}" for name, x in figures.items()}
         if self._bar is not None:
             self._bar.set_postfix(told, refresh=False)
             self._bar.update(steps)
@@ -89,10 +89,6 @@ class Progress:
 def _may_draw() -> bool:
     # In a workflow, the bars of jobs that run side by side would overwrite each other.
     return LOG.isEnabledFor(logging.INFO) and sys.stderr.isatty() and RUN_MARK not in os.environ
-
-
-def _figure(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.4g}"
 
 
 def _duration(seconds: float) -> str:

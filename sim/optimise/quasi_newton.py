@@ -15,14 +15,10 @@ The losses at hand are sums of squares that few directions bend; the trust radiu
 
 
 class QuasiNewton:
-    """Positive definite approximation of a Hessian, learned from gradient differences.
-
-    Attributes:
-        matrix: (n, n), a multiple of the identity until the first update.
-    """
+    """Positive definite approximation of a Hessian, learned from gradient differences."""
 
     def __init__(self, size: int, curvature: float) -> None:
-        self.matrix: Floats = np.eye(size) * curvature
+        self.matrix: Floats = np.eye(size) * curvature  # a multiple of 1 until the first update
         self._learned = False
 
     def reduction(self, gradient: Floats, step: Floats) -> float:

@@ -178,8 +178,7 @@ class Ligament:
     length: float  # of the shim: distance of the vertices and both depths
     free: float  # of the shim between the truncated mouths
     middle: tuple[float, float]  # (2,) of the ligament as designed
-    # of the slots at its two ends against the ligament, counter-clockwise, rad
-    angles: tuple[float, float] = (0.0, 0.0)
+    angles: tuple[float, float] = (0.0, 0.0)  # of both slots against it, counter-clockwise, rad
     strain: float = 0.0  # largest one of the shim before any load
     moment: float = 0.0  # largest one in the shim before any load, N mm
 

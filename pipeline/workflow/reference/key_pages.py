@@ -114,7 +114,8 @@ def _keys(section: Node) -> str:
 def kind(node: Node) -> str:
     """Tells in words what may be given."""
     if "$ref" in node:
-        return _link(_heading(node["$ref"].rpartition("/")[2]))
+        heading = _heading(node["$ref"].rpartition("/")[2])
+        return f"[{heading}](#{heading.lower().replace(' ', '-')})"
     if forms := node.get("anyOf") or node.get("oneOf"):
         return " or ".join(kind(form) for form in forms if form.get("type") != "null")
     if choices := node.get("enum") or [node[key] for key in ("const",) if key in node]:
@@ -124,10 +125,6 @@ def kind(node: Node) -> str:
     if node["type"] == "object":
         return f"mapping to {kind(node['additionalProperties'])}"
     return _scalar(node)
-
-
-def _link(heading: str) -> str:
-    return f"[{heading}](#{heading.lower().replace(' ', '-')})"
 
 
 def _scalar(node: Node) -> str:

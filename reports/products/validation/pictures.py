@@ -62,7 +62,8 @@ def draw_pictures(made: xr.Dataset, asked: KnownPictures, folder: Path) -> Figur
         _show(axes, read_picture(path), reach)
         for part, outline in enumerate(outlines):
             motion = np.zeros(3) if k == 0 else made["measured"].values[part, at[k - 1]]
-            corners = _moved(outline, np.array(parts.parts[part].centre), motion)
+            centre = np.array(parts.parts[part].centre)
+            corners = centre + motion[:2] + (outline - centre) @ rotation_matrix(motion[2]).T
             for colour, width in (("white", 2.0), (style.INTACT if k == 0 else style.CLOAKED, 1.0)):
                 axes.fill(*corners.T, facecolor="none", edgecolor=colour, linewidth=width)
     for k, name in enumerate(("to the right", "down", "rotation")):
@@ -72,10 +73,6 @@ def draw_pictures(made: xr.Dataset, asked: KnownPictures, folder: Path) -> Figur
     axes = style.place(drawn, 28.0, 124.0, 124.0, 80.0)
     _specimen(axes, made, read_picture(folder / asked.specimen.file))
     return drawn
-
-
-def _moved(outline: Floats, centre: Floats, motion: Floats) -> Floats:
-    return centre + motion[:2] + (outline - centre) @ rotation_matrix(motion[2]).T
 
 
 def _show(axes: Axes, image: Image, reach: tuple[Floats, Floats]) -> None:
