@@ -88,9 +88,12 @@ $(STUDIES) $(PAGES): setup
 $(PRODUCTS): setup
 	@exec $(BIN)/python -m pipeline run "$$TARGET"
 
-# a study with a preset: make fig2@edge3
-$(foreach study,$(STUDIES),$(study)@%): setup
-	@exec $(BIN)/python -m pipeline run "$$TARGET"
+# A study with a preset: make fig2@edge3. A pattern a rule, as one rule of several counts all of them as made.
+define preset_of
+$(1)@%: setup
+	@exec $$(BIN)/python -m pipeline run "$$$$TARGET"
+endef
+$(foreach study,$(STUDIES),$(eval $(call preset_of,$(study))))
 
 publish: setup
 	@$(BIN)/python -m pipeline run $(or $(STUDY),fig2) && $(BIN)/python -m pipeline publish $(or $(STUDY),fig2)

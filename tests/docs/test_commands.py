@@ -115,3 +115,9 @@ def test_commands_and_files_in_a_sentence_are_there() -> None:
         assert module != "pipeline" or not stage or stage in STAGES
     for name in set(inline(r"((?:sim|pipeline|reports|tests|experiments|docs)/[a-z_/.]+)")):
         assert (ROOT / name).exists() or "logo" in name, name
+
+
+def test_presets_of_several_studies_are_all_built() -> None:
+    words = ["make", "--dry-run", "fig2@quick", "fig4@quick", "fig2"]
+    told = subprocess.check_output(words, cwd=ROOT, text=True)
+    assert told.count("-m pipeline run") == 3
