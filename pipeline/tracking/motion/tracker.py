@@ -25,7 +25,7 @@ _SHARE = 0.35
 """Least part of a unit's information that a fit needs; less if photometry and place are known."""
 _SHARE_KNOWN = 0.18
 _PARTLY, _SHADED = 0.6, (0.06, 0.15)
-"""What is seen of a unit is as bright as before: changes of slopes from which its fit has to be
+"""Brightness of a unit that is seen as before: changes of slopes from which its fit has to be
 better, and from which one that is seen in part, less than so much, is none."""
 _GAIN = (0.12, 4.0)
 """Gain, against the reference frame's, between which a unit can be seen."""

@@ -56,7 +56,7 @@ Problem = dict[str, Any]
 
 @pytest.fixture
 def content(fig2: Path) -> Problem:
-    """What fig2's problem file holds."""
+    """Loads fig2's problem file."""
     content: Problem = yaml.safe_load(fig2.read_bytes())
     return content
 
