@@ -35,7 +35,11 @@ FAMILIES: dict[str, StressFamily] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Attempts all cases and stores the counts; 1 if one is wrong or too few are solved."""
+    """Attempts all cases, prints and stores the counts.
+
+    Returns:
+        1 if an answer is wrong or too few cases in range are solved, otherwise 0.
+    """
     args = _parser().parse_args(arguments)
     if unknown := sorted(set(args.names) - set(FAMILIES)):
         known = ", ".join(FAMILIES)

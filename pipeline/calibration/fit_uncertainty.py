@@ -62,11 +62,13 @@ def _wider(inverse: Floats, lost: Floats) -> Floats:
 def information_lost(fit: Fit) -> Floats:
     """Computes the part of the second derivatives that drives known by measurement alone take.
 
-    (n_unknowns, n_unknowns), of half the sum of squares. Which motion of the driven units explains
-    the residuals best is another one at other constants: as p(theta, u) is the prediction and P the
-    covariance of the drive's changes u once the free units are known,
-    (dp/dtheta . dp/du + rho . d2p/dtheta du) P (the same)' is taken from dp/dtheta . dp/dtheta,
-    with rho the weighted residuals. Products without rho are in J'J.
+    Which motion of the driven units explains the residuals best is another one at other constants:
+    as p(theta, u) is the prediction and P the covariance of the drive's changes u once the free
+    units are known, (dp/dtheta . dp/du + rho . d2p/dtheta du) P (the same)' is taken from
+    dp/dtheta . dp/dtheta, with rho the weighted residuals. Products without rho are in J'J.
+
+    Returns:
+        (n_unknowns, n_unknowns), of half the sum of squares.
 
     Raises:
         SimulationError: a step failed, or an equilibrium is not stable.

@@ -40,8 +40,11 @@ class CyclePath(NamedTuple):
     def compare(self, known: Floats) -> Floats:
         """Sets the slope of the energy beside that which others found.
 
-        Takes (n, 2) approach, mm, and slope, N; returns (n, 2) the difference of the energy over
-        two steps, as theirs, and the force, N.
+        Args:
+            known: (n, 2) approach, mm, and slope, N, there.
+
+        Returns:
+            (n, 2) the difference of the energy over two steps, as theirs, and the force, N.
         """
         way, at = slice(self.turn + 1), known[:, 0]
         approach, energy = (np.r_[0.0, each[way]] for each in (self.approach, self.energy))

@@ -166,7 +166,9 @@ def _inflation(rest: Floats) -> float:
 def find_load_time(measured: Floats, nominal: SampledMotion) -> Floats:
     """Finds the nominal time (frames,) of the measured drive's place; NaN beyond its ends.
 
-    That is the displacement (frames,) along the drive, mm; the nominal one only grows.
+    Args:
+        measured: (frames,) displacement of the driven units along the drive, mm.
+        nominal: its course, one channel that only grows.
 
     Raises:
         UserError: too few frames, a drive that goes to and fro, or one that hardly moves.

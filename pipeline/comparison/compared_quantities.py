@@ -33,8 +33,11 @@ def list_quantities(
 ) -> dict[str, Quantity]:
     """Lists the quantities by name; without an intact structure there is nothing to mimic.
 
-    Times (frames,) are the response's, s, NaN where it has none; units (n_units,) are those that
-    are compared in the region of interest.
+    Args:
+        asked: the problem.
+        response: of all structures under the load case of the recording.
+        time: (frames,) of the response at the frames, s; NaN where it has none.
+        inside: (n_units,) those that are compared in the region of interest.
     """
     units = np.flatnonzero(inside)
     low, high = (middle_units(asked, side) for side in ("bottom", "top"))

@@ -139,7 +139,12 @@ def expected_coverage(copies: Floats, band: Floats, level: float) -> Floats:
     """Computes the share (dofs,) of its motion in the band that a copy has with a probability.
 
     One specimen is one draw: where it is far off in a constant, all its units leave the band
-    together. Copies are (samples, frames, units, dofs), their band (3, frames, units, dofs).
+    together.
+
+    Args:
+        copies: (samples, frames, units, dofs) that the band was drawn from.
+        band: (3, frames, units, dofs).
+        level: the probability.
     """
     if len(copies) == 0:
         return np.full(copies.shape[-1], np.nan)

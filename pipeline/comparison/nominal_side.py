@@ -38,8 +38,11 @@ def drive_direction(response: xr.Dataset) -> Floats:
 def find_axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool) -> ComparisonAxis:
     """Places the measured frames on the axis of a response of one structure and case.
 
-    Frames have times (frames,), s, and the driven units' displacement (frames, 2), mm; the response
-    is static where it is a path of equilibria.
+    Args:
+        time: (frames,) on the track's clock, s.
+        drive: (frames, 2) measured displacement of the driven units, mm.
+        response: the nominal one.
+        static: whether it is a path of equilibria.
 
     Raises:
         UserError: the drive cannot be aligned.

@@ -140,11 +140,17 @@ def compliance_shares(
 ) -> Floats:
     """Estimates compliances (n_units,) of the units over those of their stiffest ligaments.
 
-    As a beam of width w, along the line between the two vertices (mm) that are farthest apart, a
-    unit of modulus E (MPa) and thickness t (mm) gives way to forces along it by the integral of
-    1 / (E t w), to moments at both ends by that of 12 / (E t w^3), and to a force across it at
-    another vertex, held at both ends, by that of 12 m^2 / (E t w^3), m the moment of a unit force
-    (Euler-Bernoulli); the largest counts.
+    As a beam of width w, along the line between the two vertices that are farthest apart, a unit
+    gives way to forces along it by the integral of 1 / (E t w), to moments at both ends by that of
+    12 / (E t w^3), and to a force across it at another vertex, held at both ends, by that of
+    12 m^2 / (E t w^3), m the moment of a unit force (Euler-Bernoulli); the largest counts.
+
+    Args:
+        lattice: of the units.
+        vertices: (n_vertices, 2) of their structure, mm.
+        material: of the ligaments.
+        modulus: Young's modulus of the units, MPa.
+        thickness: of the units, mm.
     """
     axial, bending = (
         np.max(np.asarray(each)) for each in (material.axial_stiffness, material.bending_stiffness)

@@ -29,9 +29,19 @@ def write(
     ink: Ink,
     paper: Paper,
 ) -> int:
-    """Writes the sheets, titled, and returns their number; the same specimen gives the same bytes.
+    """Writes the sheets; the same specimen gives the same bytes.
 
-    The ink is dark faces with light marks, for a bright board, or the other way round.
+    Args:
+        path: the PDF.
+        specimen: the units.
+        marks: what goes on them.
+        labels: of the units.
+        title: at the head of every page.
+        ink: dark faces with light marks, for a bright board, or the other way round.
+        paper: size of the pages.
+
+    Returns:
+        Number of pages.
 
     Raises:
         UserError: a unit is larger than a page.

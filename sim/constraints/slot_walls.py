@@ -86,10 +86,11 @@ def points(lattice: Lattice, vertices: Numbers, end_angles: Floats | None = None
 
 
 def slots(lattice: Lattice) -> Ints:
-    """Lists the slots (n_slots, 5) at both ends of all ligaments.
+    """Lists the slots at both ends of all ligaments.
 
-    Far end of the ligament, vertex of the slot, the ones before and after it, and the point of the
-    slot's angle.
+    Returns:
+        (n_slots, 5) far end of the ligament, vertex of the slot, the ones before and after it, and
+        the point of the slot's angle.
     """
     far, mouth = lattice.ligaments[:, ::-1].ravel(), lattice.ligaments.ravel()
     beside = (lattice.previous_vertex[mouth], lattice.next_vertex[mouth])

@@ -53,7 +53,11 @@ def number_free_dofs(n_units: int, unit_pairs: Ints, held: Ints) -> tuple[NDArra
     """Numbers the dofs that are not held so that the tangent's band is narrow.
 
     Units have three dofs each; `unit_pairs` (n, 2) are coupled; `held` are ids of the prescribed
-    dofs, whose position (3 n_units,) is -1. Also returns the half bandwidth.
+    dofs.
+
+    Returns:
+        (3 n_units,) position of each dof among the free ones, -1 where held; and the half
+        bandwidth.
     """
     order = min(
         (np.arange(n_units), _cuthill_mckee(n_units, unit_pairs)),

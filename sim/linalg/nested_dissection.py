@@ -45,7 +45,10 @@ def dissect(
     """Orders the units that have dofs, and groups them in fronts.
 
     `site` (n_units, 2) is where they are, `pairs` (n_pairs, 2) are coupled, `n_dofs` (n_units,) are
-    free. For each front its own units and its boundary are returned, both as places in the order.
+    free.
+
+    Returns:
+        units in order; for each front its own units and its boundary, both as places in the order.
     """
     neighbour = _neighbours(len(site), pairs)
     parts = _cut(np.flatnonzero(n_dofs), site, neighbour)

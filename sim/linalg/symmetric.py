@@ -58,11 +58,14 @@ class Matrix(NamedTuple):
 def number_free_dofs(
     site: Floats, pairs: Ints, held: Ints, by_fronts: bool | None = None
 ) -> tuple[Ints, Pattern]:
-    """Numbers the dofs (3 n_units,) as the tangent is solved fastest, -1 where held.
+    """Numbers the dofs that are not held, in the order in which the tangent is solved fastest.
 
     `site` (n_units, 2) is where the units are, three dofs each; `pairs` (n, 2) are coupled; `held`
     are ids of the prescribed dofs; `by_fronts` tells how to store the tangent, by default whichever
     should be faster.
+
+    Returns:
+        (3 n_units,) position of each dof among the free ones, -1 where held; and the pattern.
     """
     if by_fronts is not None:
         return (_in_fronts if by_fronts else _in_a_band)(site, pairs, held)

@@ -75,7 +75,10 @@ class _Search:
 class LoadSet:
     """Computes what is minimised: the p-mean of the losses under a set of loads.
 
-    The load cases of the scene, the drive's own, stay in the set.
+    Args:
+        losses: of the family.
+        scene: whose load cases, the drive's own, stay in the set.
+        options: of the minimisation.
     """
 
     def __init__(self, losses: LoadLosses, scene: Scene, options: FamilyOptions) -> None:

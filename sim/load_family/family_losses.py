@@ -98,9 +98,12 @@ class LoadLoss(NamedTuple):
 
 
 class LoadLosses:
-    """Computes the losses of designs under the loads of a family, of as many periods for each.
+    """Computes the losses of designs under the loads of a family.
 
-    `of_design` is the differentiable map of a design vector to parameters.
+    Args:
+        scene: what the loads act on; its horizon is of as many periods for each of them.
+        family: the loads.
+        of_design: differentiable map of a design vector to parameters.
     """
 
     def __init__(

@@ -45,11 +45,15 @@ def spread_places(family: LoadFamily, count: int, seed: int) -> Floats:
 def ascend(
     loss: Callable[[Floats], tuple[float, Floats]], start: Floats, evaluations: int
 ) -> FoundLoad:
-    """Searches the load of the greatest loss near a place (n,), by projected quasi-Newton steps.
+    """Searches the load of the greatest loss near a place, by projected quasi-Newton steps.
 
     A load that cannot be simulated counts as harmless, with a warning. The search goes by the loss
-    over that at its start, as the stopping rule of L-BFGS-B is relative to 1 at least, and takes
-    about so many evaluations, at most.
+    over that at its start, as the stopping rule of L-BFGS-B is relative to 1 at least.
+
+    Args:
+        loss: of a place, with its gradient (n,).
+        start: (n,).
+        evaluations: about so many, at most.
     """
     from scipy.optimize import minimize
 
@@ -83,8 +87,12 @@ def search_worst(
 ) -> list[FoundLoad]:
     """Searches the worst loads of a family, from the worst of spread ones; the worst comes first.
 
-    By the loss at a place (n,), alone and with its gradient; from known places besides, if they are
-    among the worst.
+    Args:
+        value: loss at a place (n,).
+        loss: the same with its gradient.
+        family: the loads.
+        options: of the search.
+        known: places to start from besides, if they are among the worst.
     """
     starts = [*known, *spread_places(family, options.samples, options.seed)]
 

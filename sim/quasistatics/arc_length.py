@@ -82,7 +82,10 @@ def trace_first_snap(
     """Traces the path that the first snap of a solution leaves, from the last load before it.
 
     It ends where it comes by that snap's load again, or by that of the last one before the next
-    load; where it branches, at the full load. None without a snap, or with one at rest.
+    load; where it branches, at the full load.
+
+    Returns:
+        the path; None without a snap, or with one at rest.
     """
     if not len(record.snaps) or record.snaps[0] <= 0.0:
         return None

@@ -114,10 +114,13 @@ def estimated_errors(
 ) -> tuple[float, float]:
     """Estimates the errors of a region's motion and of its loss by a solution with half the steps.
 
-    Root mean square, relative to the motion, and relative to the `size` of a loss. A motion that
-    starts with a jump converges with the first power of the steps or less: its error is about twice
-    what changes. The change of a loss may happen to vanish; what is quadratic in that of the motion
-    is left then. Motions, in comparable units, and losses are as solved and with half the steps.
+    A motion that starts with a jump converges with the first power of the steps or less: its error
+    is about twice what changes. The change of a loss may happen to vanish; what is quadratic in
+    that of the motion is left then. Motions, in comparable units, and losses are as solved and with
+    half the steps; `size` is that of a loss, whose error is relative to it.
+
+    Returns:
+        the error of the motion, root mean square, relative to it; that of the loss.
     """
     motion = CHANGE * _relative(np.linalg.norm(motions[0] - motions[1]), np.linalg.norm(motions[1]))
     loss = CHANGE * _relative(abs(losses[0] - losses[1]), size)

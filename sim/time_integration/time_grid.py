@@ -77,10 +77,11 @@ def stage_times(times: Floats, nodes: Floats) -> Floats:
 
 
 def hermite_stencils(times: Floats, output_times: Floats) -> tuple[np.ndarray, Floats, Floats]:
-    """Cubic Hermite interpolation between grid points: in which step (n_times,) each time lies.
+    """Cubic Hermite interpolation between grid points.
 
-    And the weights (n_times, 4) of value at the left and right end, slope at the left and right
-    end, in the value and in the slope.
+    Returns:
+        (n_times,) step in which each output time lies, and the weights (n_times, 4) of value at the
+        left and right end, slope at the left and right end, in the value and in the slope.
     """
     interval = np.clip(np.searchsorted(times, output_times, side="right") - 1, 0, len(times) - 2)
     h = times[interval + 1] - times[interval]

@@ -131,10 +131,16 @@ def sample_posteriors(
 ) -> Draws:
     """Draws from the posteriors of many sets of readings by the no-U-turn sampler, side by side.
 
-    Readings have `used` and `log_force` (n_sets, n_kinds, n), priors each number (n_sets, ...);
-    draws come after the steps to warm up. Returns mean, spread (n_sets, draws, 3), constants
-    (n_sets, draws, n_samples, 3), discrepancy (n_sets, draws), mounting and reading (n_sets, draws,
-    n_kinds), diverging (n_sets, draws).
+    Args:
+        readings: with `used` and `log_force` (n_sets, n_kinds, n).
+        priors: of every set, each number (n_sets, ...).
+        warm_up: steps that are not kept.
+        draws: that are.
+        seed: of all.
+
+    Returns:
+        mean, spread (n_sets, draws, 3), constants (n_sets, draws, n_samples, 3), discrepancy
+        (n_sets, draws), mounting and reading (n_sets, draws, n_kinds), diverging (n_sets, draws).
     """
     run = jax.jit(partial(_walks, warm_up=warm_up, draws=draws))
     found = run(readings, priors, jax.random.split(jax.random.PRNGKey(seed), len(readings.used)))

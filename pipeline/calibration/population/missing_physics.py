@@ -164,8 +164,13 @@ def rank_mechanisms(
 ) -> list[RankedMechanism]:
     """Ranks all mechanisms, the one that explains most first.
 
-    Constants take up by their slopes what changes the tests of the fit; samples have a spread (3,);
-    the residual (n,), logarithm of measured over predicted force, is at displacements (n,), mm.
+    Args:
+        fitted: tests of the fit.
+        predicted: the other.
+        slopes: by which the constants take up a change.
+        spread: (3,) of the samples' constants.
+        displacement: (n,) of the prediction, mm.
+        residual: (n,) logarithm of measured over predicted force.
     """
     other = slopes.predicted @ spread
     found = [_ranked("a stiffer sample", "one standard deviation", other, other, residual)]

@@ -72,16 +72,24 @@ def pose_curve(emulator: CurveEmulator, displacement: Floats, kind: int) -> Pose
 def redraw_population(
     draws: Draws, priors: PriorNumbers, random: np.random.Generator, repeats: int = REPEATS
 ) -> Draws:
-    """Draws mean and spread anew, several times (n_draws * repeats, ...) for each draw.
+    """Draws mean and spread anew, by their exact law given the samples' constants.
 
-    By their exact law given the samples' constants: readings tell of the population through its
-    samples alone. With n of them, of mean m and sum of squares q about it, and the prior N(c, w^2)
-    of the mean,
+    Readings tell of the population through its samples alone. With n of them, of mean m and sum of
+    squares q about it, and the prior N(c, w^2) of the mean,
 
         p(ln s | m, q) ~ p(ln s) s^(1 - n) exp(-q / 2 s^2) N(m; c, w^2 + s^2 / n),
 
     and the mean is normal given s. The walk of a sampler through the long tail of s would leave
     far more noise in the ends of a band.
+
+    Args:
+        draws: from one posterior, each (n_draws, ...).
+        priors: of it.
+        random: where they are drawn from.
+        repeats: for every draw.
+
+    Returns:
+        (n_draws * repeats, ...) draws from the same posterior.
     """
     constants = np.moveaxis(draws["constants"], 1, 2)  # (n_draws, 3, n_samples)
     count, middle = constants.shape[-1], constants.mean(axis=-1, keepdims=True)
@@ -114,9 +122,17 @@ def new_curves(
     sample: int | None = None,
     repeats: int = 1,
 ) -> Floats:
-    """Draws curves (n * repeats, n_points) of a sample as they would be read, logarithms of forces.
+    """Draws curves of a new sample, or of a known one, as they would be read.
 
-    Of a sample of the fit, or of a new one where none is named; so many for each of n draws.
+    Args:
+        curve: the curve.
+        draws: from one posterior, each (n, ...).
+        random: where the rest is drawn from.
+        sample: a sample of the fit, in place of a new one.
+        repeats: curves for every draw.
+
+    Returns:
+        (n * repeats, n_points) logarithms of forces.
     """
     repeated = {name: np.repeat(draws[name], repeats, axis=0) for name in _DRAWN}
     logs = repeated["mean"] + repeated["spread"] * random.normal(size=repeated["mean"].shape)
@@ -142,7 +158,12 @@ def find_band(curves: Floats) -> PredictionBand:
 
 
 def student_band(curve: PosedCurve, constants: Floats) -> PredictionBand:
-    """Finds Student's interval of a new sample from logarithms of constants (n_samples, 3)."""
+    """Finds Student's interval of a new sample from so many samples' own predictions.
+
+    Args:
+        curve: the curve.
+        constants: (n_samples, 3) logarithms.
+    """
     each = curve.predict(constants)
     count = len(each)
     quantile = stdtrit(count - 1, (1 + LEVEL) / 2) * np.sqrt(1 + 1 / count)
@@ -172,8 +193,13 @@ def try_band(
 ) -> Coverage:
     """Simulates sets of samples from a known population, and fits each as if it were measured.
 
-    Readings tell the design: which samples are read in which test, and where; the truth has mean,
-    spread (3,), discrepancy (), mounting and reading (n_kinds,).
+    Args:
+        readings: the design: which samples are read in which test, and where.
+        priors: of the fit.
+        curve: that is predicted.
+        truth: mean, spread (3,), discrepancy (), mounting and reading (n_kinds,).
+        effort: how many sets, and how long each is sampled.
+        seed: of all.
     """
     random, n_sets = np.random.default_rng(seed), effort.simulated_sets
     n_samples = readings.shares.shape[-1]

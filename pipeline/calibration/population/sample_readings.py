@@ -75,9 +75,10 @@ def stack_readings(
     samples: Sequence[str],
     points: int,
 ) -> tuple[Readings, list[list[str]]]:
-    """Stacks the curves, kind by kind in the order of the emulators; all readings are used.
+    """Stacks the curves, kind by kind in the order of the emulators.
 
-    Also returns, by kind, the name of the curve that each reading is of.
+    Returns:
+        the readings, all used, and by kind the name of the curve that each reading is of.
     """
     rows: list[list[tuple[SampleCurve, int]]] = []
     for kind, emulator in emulators.items():

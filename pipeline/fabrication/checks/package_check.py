@@ -35,7 +35,15 @@ def check_package(
     pictures: Path,
     done: Callable[[], object] = lambda: None,
 ) -> None:
-    """Reads back every file of a package that was made of a design; tells when each step is done.
+    """Reads every file of a package back and stops at faults.
+
+    Args:
+        folder: the package.
+        design: the dataset that it was made of.
+        structure: intact, altered or cloaked.
+        settings: of the fabrication.
+        pictures: folder for pictures of faults; made only if there are any.
+        done: called after each of the STEPS.
 
     Raises:
         UserError: the first fault, with its unit, the parameter to change and a picture.

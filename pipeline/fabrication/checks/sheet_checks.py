@@ -100,7 +100,13 @@ def _meetings(curves: Sequence[Curve]) -> Iterator[tuple[Curve, Curve, Geometry]
 
 
 def check_sheet(drawing: Drawing, laser: Laser, thickness: float) -> Iterator[Fault]:
-    """Checks a sheet: scale, places of parts, letters, and holes, none smaller than it is thick."""
+    """Checks a sheet: its scale, the place of its parts, its holes and its letters.
+
+    Args:
+        drawing: a written sheet.
+        laser: settings of the sheets.
+        thickness: of the material, mm; no hole may be smaller.
+    """
     yield from check_scale(drawing, laser)
     yield from _check_places(drawing, laser)
     kerf = 0.0 if drawing.file.stem.endswith(NOMINAL) else laser.kerf
@@ -207,9 +213,12 @@ def _check_letters(drawing: Drawing) -> Iterator[Fault]:
 def check_compensation(
     cut: Sequence[Drawing], nominal: Sequence[Drawing], kerf: float
 ) -> Iterator[Fault]:
-    """Checks sheets with the kerf k, mm, made good: outer cuts lie k/2 out, inner ones in.
+    """Checks compensated sheets against nominal ones: outer cuts k/2 out, inner ones in.
 
-    All sheets of one kind of parts, which at nominal size may lie elsewhere on other sheets.
+    Args:
+        cut: all sheets of one kind of parts, with the kerf made good.
+        nominal: the same parts at nominal size, maybe elsewhere on other sheets.
+        kerf: width of the cut, mm.
     """
     ours, theirs = _closed_cuts(cut), _closed_cuts(nominal)
     if {key: len(cuts) for key, cuts in ours.items()} != {k: len(c) for k, c in theirs.items()}:

@@ -52,8 +52,16 @@ def place_id(words: str, outline: Polygon, body: Polygon, settings: Labels) -> P
     """Places an id inside an outline, as large, as upright and as central as there is room for.
 
     Where slots leave no room even for the smallest letters, they cut through the letters; where
-    the body, the outline without slots, leaves none, the letters lose a corner. Returns None if it
-    has no room even so, or could not be read.
+    the body leaves none, the letters lose a corner.
+
+    Args:
+        words: the id.
+        outline: of the part, with slots.
+        body: the same without slots.
+        settings: preferred size of the letters.
+
+    Returns:
+        None if it has no room even so, or could not be read.
     """
     uncut = next(_placements(words, outline, outline, settings), None)
     if uncut is not None:

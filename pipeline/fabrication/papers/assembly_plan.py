@@ -273,8 +273,11 @@ def number_places(
 ) -> dict[int, tuple[float, float]]:
     """Finds the middle of each number, near to its shim and clear of all else.
 
-    By id: the middles (2,) of shims, mm, width and height of the numbers' boxes, the lines (n, 2)
-    of the shims; taken are the boxes (left, bottom, right, top) of ids and arrows.
+    Args:
+        middles: (2,) of shims, mm, by id.
+        sizes: width and height of the numbers' boxes, by id.
+        paths: (n, 2) lines of the shims, by id.
+        taken: boxes (left, bottom, right, top) of ids and arrows.
     """
     reach, turn = (grid.ravel() for grid in np.meshgrid(_DISTANCES, _TURNS, indexing="ij"))
     aside = reach[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])

@@ -83,10 +83,15 @@ def bill_rows(
     prints: Mapping[str, PrintEstimate],
     infill: float,
 ) -> Iterator[BillRow]:
-    """Yields each unit, kind of shim, ligament, file to cut or print of a specimen, the totals.
+    """Yields rows: each unit, kind of shim, ligament, file to cut or print, the totals.
 
-    Units have an areal density, tonne/mm^2. By path in the package: ids of the parts in each sheet,
-    plate and fixture, and what printed ones take; of their inside the share `infill` is filled.
+    Args:
+        specimen: to be built.
+        settings: of the fabrication.
+        density: areal density of the units, tonne/mm^2.
+        contents: ids of the parts in each sheet, plate and fixture, by its path in the package.
+        prints: what the printed ones of them take.
+        infill: share of their inside that is filled.
     """
     holders: dict[str, list[str]] = {}
     for file, parts in contents.items():

@@ -48,9 +48,14 @@ def write_manifest(
     design: Path,
     as_built: Mapping[str, float | str] | None = None,
 ) -> None:
-    """Writes the manifest of all other files in a package's folder, which are there by then.
+    """Writes the manifest of all other files in a package's folder.
 
-    With what the simulation makes of the shims as drawn, if it was asked.
+    Args:
+        folder: the package, complete but for its manifest.
+        specimen: what is built.
+        problem: the problem whose section `fabrication` holds.
+        design: the design dataset.
+        as_built: what the simulation makes of the shims as drawn, if it was asked.
     """
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != MANIFEST)
     content = {

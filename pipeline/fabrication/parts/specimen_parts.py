@@ -37,10 +37,13 @@ Strokes = tuple[Floats, ...]
 
 
 class UnbuildableUnitError(UserError):
-    """Reports a unit of a design that cannot be made.
+    """Reports a unit of a design that cannot be made, with what a picture of it needs.
 
-    With the fault in one sentence, the words of a user's error, and what a picture of it needs:
-    outlines around, and the spot of the fault, mm.
+    Args:
+        what: the fault in one sentence, with the unit's label.
+        around: outlines to show, mm.
+        spot: where the fault is, mm.
+        words: file, key, value and remedy of the error.
     """
 
     def __init__(

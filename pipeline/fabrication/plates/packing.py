@@ -43,7 +43,11 @@ def pack(
 ) -> list[Spot]:
     """Packs parts on sheets, as they are turned; the spots are in the order of the parts.
 
-    Sizes are widths and heights, mm, also of a sheet; its margin stays free, and a gap.
+    Args:
+        sizes: width and height of each part, mm.
+        sheet: width and height of a sheet.
+        margin: free rim.
+        gap: least distance of two parts.
 
     Raises:
         TooLargeError: a part is larger than the room on a sheet.

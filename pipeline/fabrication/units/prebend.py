@@ -42,7 +42,11 @@ def prebend(first: Slot, second: Slot, settings: Fabrication) -> PreBend:
 def peak_curvature(start: Floats, leaves: Floats, end: Floats, enters: Floats) -> Floats:
     """Computes the largest curvature (...) of strips between clamps, 1/mm.
 
-    They leave one end and enter the other (..., 2), mm, along unit vectors (..., 2).
+    Args:
+        start: (..., 2) where strips are clamped, mm.
+        leaves: (..., 2) unit vectors along the strips there.
+        end: (..., 2) the other ends, mm.
+        enters: (..., 2) unit vectors along the strips there.
     """
     chord = end - start
     length = np.linalg.norm(chord, axis=-1)

@@ -30,7 +30,7 @@ class Corner:
     """Marks a vertex of a unit that takes a slot."""
 
     vertex: int
-    ligament: int  # id of the one there
+    ligament: int  # id of the ligament there
     along: Floats  # (2,) unit vector of the ligament, pointing into the unit
     length: float  # of the ligament, mm
     turn: float | None = None  # of the slot against the ligament, rad, if designed; None if free

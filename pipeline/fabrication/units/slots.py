@@ -40,7 +40,13 @@ class NoRoomError(ValueError):
 def place_slots(
     polygon: Polygon, corners: Sequence[Corner], settings: Fabrication, room: Polygon
 ) -> tuple[Slot, ...]:
-    """Places the slots of a unit (mm, counter-clockwise) at its corners, in the room that it has.
+    """Places the slots of a unit.
+
+    Args:
+        polygon: the unit as designed, mm, counter-clockwise.
+        corners: the vertices that take a slot.
+        settings: depths, directions and walls of slots.
+        room: the polygon itself, or the area that the unit may grow to.
 
     Raises:
         NoRoomError: there are no slots with thick enough walls.

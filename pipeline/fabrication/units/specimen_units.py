@@ -36,11 +36,18 @@ def build_specimen(
     file: Path,
     done: Callable[[], None] = lambda: None,
 ) -> BuiltSpecimen:
-    """Builds the specimen of a structure, named by its study and itself; tells of each unit done.
+    """Builds the specimen of a structure.
+
+    Args:
+        net: the structure.
+        settings: of the fabrication.
+        names: of the study and of the structure.
+        file: the design dataset, for messages.
+        done: called after each unit.
 
     Raises:
         UnbuildableUnitError: units overlap, a slot or an id has no room, a shim is bent too much;
-            names the unit and what to change in the file of the design.
+            names the unit and what to change.
     """
     refuse_overlaps(net, file)
     units, letters = {}, LETTERS
@@ -63,10 +70,18 @@ def build_unit(
     file: Path,
     letters: str = LETTERS,
 ) -> Unit:
-    """Builds a unit from its body; it carries one of the letters where its id has no room.
+    """Builds a unit.
+
+    Args:
+        net: the structure.
+        number: of the unit.
+        made: its body and its slots.
+        settings: of the fabrication.
+        file: the design dataset, for messages.
+        letters: it carries one of these where there is no room for its id.
 
     Raises:
-        UnbuildableUnitError: that has no room either; names the file of the design.
+        UnbuildableUnitError: its id has no room.
     """
     label, design = net.labels[number], net.polygons[number]
     body, slots = made

@@ -41,8 +41,13 @@ class UnitBody(NamedTuple):
 def unit_bodies(net: UnitNetwork, settings: Fabrication, file: Path) -> dict[int, UnitBody]:
     """Grows all units of a structure and places their slots, by id.
 
+    Args:
+        net: the structure.
+        settings: of the fabrication.
+        file: the design dataset, for messages.
+
     Raises:
-        UnbuildableUnitError: a slot has no room; names the file of the design.
+        UnbuildableUnitError: a slot has no room.
     """
     order, slotted = list(net.numbers), corners(net)
     far = {(a, i): b for i, (a, _), (b, _), _ in net.ligaments}
@@ -93,10 +98,18 @@ def unit_body(
     settings: Fabrication,
     file: Path,
 ) -> UnitBody:
-    """Grows a unit as little as the slots at its vertices need, among bodies of its neighbours.
+    """Grows a unit as little as its slots need, and places these.
+
+    Args:
+        net: the structure.
+        number: of the unit.
+        slotted: its vertices that take a slot.
+        neighbours: bodies of the units around it.
+        settings: of the fabrication.
+        file: the design dataset, for messages.
 
     Raises:
-        UnbuildableUnitError: a slot has no room; names the file of the design.
+        UnbuildableUnitError: a slot has no room.
     """
     design = net.polygons[number]
     plain = filleted(design, settings.fillet_radius)
@@ -155,8 +168,13 @@ def _no_slot(
 def end_angles(net: UnitNetwork, settings: Fabrication, file: Path) -> Floats:
     """Measures the slots of all shims against their ligaments (n_ligaments, 2), rad.
 
+    Args:
+        net: the structure.
+        settings: of the fabrication.
+        file: the design dataset, for messages.
+
     Raises:
-        UnbuildableUnitError: units overlap, or a slot has no room; names the file of the design.
+        UnbuildableUnitError: units overlap, or a slot has no room.
     """
     refuse_overlaps(net, file)
     made = unit_bodies(net, settings, file)

@@ -9,9 +9,10 @@ from sim.core import Floats, Ints, Mask
 
 
 def smaller_angles(problem: Problem, part: xr.Dataset) -> Floats:
-    """Returns the smaller void angle (n_times, n_ligaments) beside each ligament, rad.
+    """Returns the smaller void angle beside each ligament of a structure under one load case, rad.
 
-    Of a structure under one load case, in the order of ``from_dataset``.
+    Returns:
+        (n_times, n_ligaments) in the order of ``from_dataset``.
     """
     structure = from_dataset(part, problem.lattice.spacing)
     turns = part["displacement"].sel(dof="theta").transpose("time", "unit").values
