@@ -16,9 +16,10 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from pipeline.calibration import moved_parts, read_picture
+from pipeline.calibration import moved_parts
 from pipeline.calibration.inputs import KnownPictures
 from pipeline.problem.reading import load_section
+from pipeline.tracking.frames import read_picture
 from pipeline.tracking.geometry import rigid_motion, rotation_matrix
 from pipeline.tracking.motion import Patch, find_motion, fit_motion
 from sim.core import Floats

@@ -64,7 +64,15 @@ class View(NamedTuple):
 
 
 class Renderer:
-    """Draws the units of a specimen as they move, seen in a view, under whatever covers them."""
+    """Draws a specimen that moves.
+
+    Args:
+        specimen: its units.
+        motion: of them.
+        view: how it is seen.
+        cover: hands, bolts, whatever else is in view.
+        seed: of the noise.
+    """
 
     def __init__(
         self,

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 import xarray as xr
 
@@ -12,9 +11,10 @@ from pipeline.calibration.inputs import KnownPictures, RigidParts, SpecimenPictu
 from pipeline.problem.fields import csv_columns
 from pipeline.runtime import UserError
 from pipeline.tracking.detect import detect_lattice
+from pipeline.tracking.frames import read_picture
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion import Patch, follow_patch
-from sim.core import Floats, Image
+from sim.core import Floats
 from sim.structure import Lattice
 
 DOFS = ("ux", "uy", "theta")
@@ -27,19 +27,6 @@ class MovedPart(NamedTuple):
     part: int
     patch: Patch
     reference: Floats
-
-
-def read_picture(path: Path) -> Image:
-    """Reads a picture as grey levels (rows, columns).
-
-    Raises:
-        UserError: there is none.
-    """
-    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-    if image is None:
-        remedy = "name a PNG, TIFF or JPEG that is there"
-        raise UserError("no picture that can be read", file=path, remedy=remedy)
-    return np.asarray(image, np.uint8)
 
 
 def moved_parts(asked: RigidParts, folder: Path) -> Iterator[MovedPart]:

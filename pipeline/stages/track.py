@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.calibration import read_picture
 from pipeline.datasets import provenance
 from pipeline.runtime import PREFIX, UserError, cli, found_in, write_atomically
 from pipeline.tracking.frames import (
@@ -22,16 +21,32 @@ from pipeline.tracking.frames import (
     import_video,
     load_cell,
     read_frames,
+    read_picture,
     recording,
     rendered,
 )
 from pipeline.tracking.frames import recording as recordings
-from pipeline.tracking.geometry import as_built, clamped_units, outlines_of_design, rotation_matrix
-from pipeline.tracking.motion import Patch, Track, follow_patch, track_video
-from pipeline.tracking.output import assemble_track, dic_points, driven_units, write_track_table
+from pipeline.tracking.geometry import as_built, clamped_units, outlines_of_design
+from pipeline.tracking.motion import (
+    Patch,
+    Track,
+    follow_patch,
+    moved_outline,
+    square,
+    track_video,
+)
+from pipeline.tracking.output import (
+    assemble_track,
+    dic_points,
+    driven_units,
+    write_track_table,
+)
 from pipeline.tracking.reference_frame import RecordingSetup, proposal
 
 LOG = logging.getLogger(__name__)
+
+_MOVED = "x_px,y_px,u_px,v_px,rotation_deg"
+_ORANGE = (0, 80, 230)  # blue, green, red
 
 
 def work(args: argparse.Namespace) -> None:
@@ -110,24 +125,30 @@ def _pair(*pictures: Path, args: argparse.Namespace) -> None:
     if len(pictures) != 2 or args.out is None or len(args.at or []) % 2 or not args.at:
         usage = "python -m pipeline track pair FIRST.png LATER.png --at X Y --out motions.csv"
         raise UserError("two pictures, x and y of patches, and a file are wanted", remedy=usage)
+    if args.out.suffix == ".png":
+        remedy = "name a .csv; the picture lies beside it"
+        raise UserError("a table is written there", file=args.out, key="--out", remedy=remedy)
     before, after = (read_picture(path) for path in pictures)
-    centres, half = np.reshape(args.at, (-1, 2)), 0.5 * (args.side - 1)
-    drawn = cv2.cvtColor(after, cv2.COLOR_GRAY2BGR)
-    lines = ["x_px,y_px,u_px,v_px,rotation_deg"]
+    centres = np.reshape(args.at, (-1, 2))
     for centre in centres:
-        square = half * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
-        motion = follow_patch(Patch(before, after, centre + square, centre))
-        motion[2] = np.rad2deg(motion[2])
-        lines.append(",".join("" if np.isnan(one) else f"{one:.6g}" for one in (*centre, *motion)))
+        if not (centre >= 0.0).all() or not (centre < before.shape[::-1]).all():
+            remedy = f"give x to {before.shape[1] - 1} and y to {before.shape[0] - 1}"
+            what, value = "a patch lies outside of the picture", centre.tolist()
+            raise UserError(what, file=pictures[0], key="--at", value=value, remedy=remedy)
+    drawn, rows = cv2.cvtColor(after, cv2.COLOR_GRAY2BGR), [_MOVED]
+    for centre in centres:
+        outline = square(centre, args.side)
+        motion = follow_patch(Patch(before, after, outline, centre))
+        row = (*centre, *motion[:2], np.rad2deg(motion[2]))
+        rows.append(",".join("" if np.isnan(one) else f"{one:.6g}" for one in row))
         if np.isnan(motion).any():
-            LOG.warning("warning: nothing like the patch at %g, %g is seen again", *centre)
+            LOG.warning("nothing like the patch at %g, %g is seen again", *centre)
             continue
-        LOG.info("%g, %g moved by %.4f, %.4f px and turned by %.3f deg", *centre, *motion)
-        corners = centre + motion[:2] + square @ rotation_matrix(np.deg2rad(motion[2])).T
-        outline = np.round(16 * corners).astype(np.int32)
-        cv2.polylines(drawn, [outline], True, (0, 80, 230), 1, cv2.LINE_AA, 4)
+        LOG.info("%g, %g moved by %.4f, %.4f px and turned by %.3f deg", *row)
+        corners = np.round(16 * moved_outline(outline, centre, motion)).astype(np.int32)
+        cv2.polylines(drawn, [corners], True, _ORANGE, 1, cv2.LINE_AA, 4)
     with write_atomically(args.out) as aside:
-        aside.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        aside.write_text("\n".join(rows) + "\n", encoding="utf-8")
     with write_atomically(args.out.with_suffix(".png")) as aside:
         aside.write_bytes(cv2.imencode(".png", drawn)[1].tobytes())
 

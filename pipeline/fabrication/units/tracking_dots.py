@@ -21,7 +21,10 @@ _ANGLES = np.deg2rad(np.arange(0.0, 180.0, 5.0))
 def dots(outline: Polygon, settings: Markers) -> tuple[Circle, ...]:
     """Places dots on a line through the centroid, spread as far as set or as there is room for.
 
-    Where there is no room for several dots of half the set diameter, there is one; or none.
+    Where there is no room for several dots of half the set diameter, there is one.
+
+    Returns:
+        The dots; none if there is no room for one.
     """
     rooms = [
         (diameter, outline.buffer(-(diameter / 2 + _RIM)))

@@ -11,7 +11,7 @@ import numpy as np
 from shapely import Polygon
 
 from pipeline.tracking.fit import PoseFitter, TemplateGrid, learn_templates
-from pipeline.tracking.geometry import Camera, SpecimenOutlines
+from pipeline.tracking.geometry import Camera, SpecimenOutlines, rotation_matrix
 from sim.core import Floats, Image
 
 _MARGIN = 24
@@ -32,6 +32,16 @@ class Patch(NamedTuple):
     after: Image  # likewise
     outline: Floats  # (n, 2) in the first one
     centre: Floats  # (2,) whose motion is told
+
+
+def square(centre: Floats, side: int) -> Floats:
+    """Returns the corners (4, 2) of a square of pixels about a centre (2,), px."""
+    return centre + 0.5 * (side - 1) * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+
+
+def moved_outline(outline: Floats, centre: Floats, motion: Floats) -> Floats:
+    """Moves an outline (n, 2) by shift and rotation (3,) about a centre (2,), px and rad."""
+    return centre + motion[:2] + (outline - centre) @ rotation_matrix(motion[2]).T
 
 
 def find_motion(patch: Patch) -> Floats | None:

@@ -70,7 +70,7 @@ def abscissa_of(problem: Problem, response: xr.Dataset) -> Abscissa:
     elif kind in LOADS:
         values = factor * float(response["amplitude"][0]) * time / time[-1]
     else:
-        values = path_displacement(problem, response)
+        values = driven_displacement(problem, response).isel(structure=0, case=0).values
     return Abscissa(
         name=name,
         symbol=symbol,
@@ -80,12 +80,6 @@ def abscissa_of(problem: Problem, response: xr.Dataset) -> Abscissa:
         strain=None if paper is None or not static else paper.strain,
         shown=_samples(values, problem.report.snapshots if static else problem.report.instants),
     )
-
-
-def path_displacement(problem: Problem, response: xr.Dataset, case: int = 0) -> Floats:
-    """Returns displacement (n_times,) of the driven units along the drive's direction, mm."""
-    along = driven_displacement(problem, response).isel(structure=0, case=case)
-    return np.asarray(along.values, dtype=float)
 
 
 def load_names(problem: Problem, response: xr.Dataset | xr.DataArray) -> tuple[str, ...]:

@@ -33,44 +33,42 @@ class DriveResponse:
 
 def drive_response(problem: Problem) -> DriveResponse:
     """Returns how far a load moves its units, or what force or moment a motion asks for."""
-    drive = single_drives(problem.drive)[0]
-    units = list(selected_units(drive.units, problem.lattice))
-    force, moment = partial(_sum, units, _along), partial(_sum, units, _about)
-    moved, turned = partial(_mean, units, _along), partial(_mean, units, _about)
-    if drive.kind == "force":
+    kind = single_drives(problem.drive)[0].kind
+    if kind == "force":
+        moved = partial(driven_displacement, problem)
         return DriveResponse("displacement", "Displacement", "displacement (mm)", "mm", moved)
-    if drive.kind == "torque":
-        return DriveResponse(
-            "turn", "Rotation", "rotation (°)", "deg", lambda each: np.degrees(1.0) * turned(each)
-        )
-    if drive.kind == "rotation":
-        return DriveResponse("moment", "Moment", "moment (N mm)", "N mm", moment)
-    return DriveResponse("reaction", "Reaction", "force (N)", "N", force)
+    if kind == "torque":
+        return DriveResponse("turn", "Rotation", "rotation (°)", "deg", partial(_turn, problem))
+    if kind == "rotation":
+        return DriveResponse("moment", "Moment", "moment (N mm)", "N mm", partial(_moment, problem))
+    return DriveResponse("reaction", "Reaction", "force (N)", "N", partial(_force, problem))
 
 
 def driven_displacement(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     """Finds the mean displacement in mm of the first drive's units along its direction."""
+    return _along(_driven(problem, response["displacement"]).mean("unit"), response)
+
+
+def _turn(problem: Problem, response: xr.Dataset) -> xr.DataArray:
+    """Finds the mean rotation of the units, degrees."""
+    turn = _driven(problem, response["displacement"]).sel(dof="theta").mean("unit")
+    return turn * (180.0 / np.pi)
+
+
+def _moment(problem: Problem, response: xr.Dataset) -> xr.DataArray:
+    """Finds the moment on all of the units together, N mm."""
+    return _driven(problem, response["reaction_force"]).sel(dof="theta").sum("unit")
+
+
+def _force(problem: Problem, response: xr.Dataset) -> xr.DataArray:
+    """Finds the force along the drive on all of the units together, N."""
+    return _along(_driven(problem, response["reaction_force"]).sum("unit"), response)
+
+
+def _driven(problem: Problem, values: xr.DataArray) -> xr.DataArray:
+    """Selects values of the first drive's units."""
     drive = single_drives(problem.drive)[0]
-    return _mean(list(selected_units(drive.units, problem.lattice)), _along, response)
-
-
-_Part = Callable[[xr.DataArray, xr.Dataset], xr.DataArray]
-
-
-def _sum(units: list[int], part: _Part, response: xr.Dataset) -> xr.DataArray:
-    """Adds up the reactions of units."""
-    return part(response["reaction_force"].sel(unit=units).sum("unit"), response)
-
-
-def _mean(units: list[int], part: _Part, response: xr.Dataset) -> xr.DataArray:
-    """Takes the mean motion of units."""
-    return part(response["displacement"].sel(unit=units).mean("unit"), response)
-
-
-def _about(vector: xr.DataArray, response: xr.Dataset) -> xr.DataArray:
-    """Returns the part (structure, case, time) about the normal of the plane."""
-    del response
-    return vector.sel(dof="theta").transpose("structure", "case", "time")
+    return values.sel(unit=list(selected_units(drive.units, problem.lattice)))
 
 
 def _along(vector: xr.DataArray, response: xr.Dataset) -> xr.DataArray:

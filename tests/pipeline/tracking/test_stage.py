@@ -43,8 +43,17 @@ def test_a_command_finds_turned_patches(tmp_path: Path, capsys: pytest.CaptureFi
     np.testing.assert_allclose(middle, [0.0, 0.0, -170.0], atol=0.02)
     np.testing.assert_allclose(other, [97.952, 160.569, -170.0], atol=0.02)
     assert out.with_suffix(".png").exists()
-    assert run_stage("track", ["pair", *pictures, "--out", str(out)]) == 2
-    assert "--at X Y" in capsys.readouterr().err
+    table = ["pair", *pictures, "--out", str(out)]
+    assert run_stage("track", [*table, "--at", "5", "5"]) == 0
+    assert "warning: nothing like the patch at 5, 5" in (told := capsys.readouterr().err)
+    assert "warning: warning" not in told
+    for wrong, words in (
+        (table, "--at X Y"),
+        ([*table, "--at", "600", "9"], "outside of the picture"),
+        ([*table, "--at", *at, "--out", "a.png"], "name a .csv"),
+    ):
+        assert run_stage("track", wrong) == 2
+        assert words in capsys.readouterr().err
 
 
 def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
