@@ -23,6 +23,9 @@ Work = Callable[[argparse.Namespace], None]
 LOG = logging.getLogger(__name__)
 _ROOMS = ("sim", "pipeline", "reports", "metacloak", "__main__")
 
+GRACE = 10
+"""Seconds that a terminated process may take to put away what is half done."""
+
 _PROGRAM = "python -m pipeline"
 _COMMON = (
     option("--log", type=Path, metavar="FILE", help="also write messages to this file"),
@@ -184,14 +187,20 @@ def _log_file(log: Path) -> logging.Handler:
 
 @contextmanager
 def _terminable() -> Iterator[None]:
-    """Lets SIGTERM unwind the stack, so that what is half done is put away."""
+    """Lets SIGTERM unwind the stack, so that what is half done is put away.
+
+    An exception amid a library's lock may leave it held, and the unwinding wait for it: the process
+    ends all the same after a while.
+    """
 
     def leave(number: int, frame: FrameType | None) -> None:
         del frame
+        signal.alarm(GRACE)
         raise SystemExit(128 + number)
 
     before = signal.signal(signal.SIGTERM, leave)
     try:
         yield
     finally:
+        signal.alarm(0)
         signal.signal(signal.SIGTERM, before)

@@ -90,26 +90,35 @@ def test_an_error_shows_only_what_it_knows() -> None:
 
 
 TERMINATED = """
-import os, signal, sys
+import os, signal, sys, threading
 from pathlib import Path
 from pipeline.runtime import cli
 
+cli.GRACE, held = 1, threading.Lock()
+
 def work(args):
+    held.acquire()
     try:
         os.kill(os.getpid(), signal.SIGTERM)
     finally:
         Path(sys.argv[1]).touch()
+        if "stuck" in sys.argv[1]:
+            held.acquire()
 
 sys.exit(cli.run(work, cli.parser("toy", "Do.", study=False), []))
 """
 
 
-def test_a_termination_unwinds(tmp_path: Path) -> None:
-    mark = tmp_path / "put away"
-    command = [sys.executable, "-c", TERMINATED, str(mark)]
-    done = subprocess.run(command, capture_output=True, env=dict(os.environ), check=False)
-    assert done.returncode == 128 + signal.SIGTERM
-    assert mark.exists()
+@pytest.mark.parametrize(
+    ("name", "code"), [("put away", 128 + signal.SIGTERM), ("stuck", -signal.SIGALRM)]
+)
+def test_a_termination_unwinds_or_ends_in_a_lock(tmp_path: Path, name: str, code: int) -> None:
+    command = [sys.executable, "-c", TERMINATED, str(tmp_path / name)]
+    done = subprocess.run(
+        command, capture_output=True, env=dict(os.environ), check=False, timeout=60
+    )
+    assert done.returncode == code
+    assert (tmp_path / name).exists()
 
 
 CLOSED = """
