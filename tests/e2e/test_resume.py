@@ -113,8 +113,10 @@ def check_ends(moments: Iterable[str], undisturbed: Checkout, fresh: Checkout) -
 
 
 def test_a_second_run_in_the_same_folder_is_refused(fresh: Checkout) -> None:
+    """Stopped, the first run holds its study however long the second takes to begin."""
     run = fresh.start()
     wait_until((fresh.results / "logs/design_sqp.log").exists, run)
+    os.killpg(run.pid, signal.SIGSTOP)
     ended = fresh.make()
     assert ended.returncode != 0
     assert "another run is at work on tiny" in ended.stderr
