@@ -26,6 +26,9 @@ _ROWS, _COLUMNS = np.indices((SIZE, SIZE)).reshape(2, -1).astype(np.float32) - n
 _FEW = [(column + 2 * row) % 4 == 0 for row in range(SIZE) for column in range(SIZE)]
 _COMPARED = np.array([[False] * _PIXELS, _FEW, [True] * _PIXELS], np.uint8)
 """Selects the pixels that are compared, by the kind of its cell and its place in the block."""
+_NUMBERS = _COMPARED.sum(axis=1).astype(np.int32)
+_ALIKE = np.argsort(1 - _COMPARED, axis=1, kind="stable").astype(np.int32)
+"""Number of these in a block whose cells are all of a kind, and their places, which come first."""
 _QUARTERS = np.array([0, 2, 1, 3])
 """Order in which blocks are listed, by column and row: some of the first tell of the whole."""
 
@@ -138,6 +141,14 @@ def _choose(look: TemplateArrays, lists: PixelLists) -> int:
         u = min(max(offset[k] + middle, zero), most)
         v = min(max(offset[_PIXELS + k] + middle, zero), most)
         node[k] = np.int32(v) * np.int32(size) + np.int32(u)
+    least = most_kind = kind[np.uint32(node[0])]
+    for k in range(1, _PIXELS):
+        least = min(least, kind[np.uint32(node[k])])
+        most_kind = max(most_kind, kind[np.uint32(node[k])])
+    if least == most_kind:
+        for j in range(_NUMBERS[least]):
+            chosen[j] = _ALIKE[least, j]
+        return int(_NUMBERS[least])
     n = 0
     for k in range(_PIXELS):
         chosen[n] = k
@@ -158,8 +169,9 @@ def cut_out(scene: FramePixels, box: Floats, lists: PixelLists) -> None:
     top, left = int(box[0]), int(box[2])
     wide = -(-(int(box[3]) - left) // SIZE) * SIZE
     for row in range(-(-(int(box[1]) - top) // SIZE) * SIZE):
+        seen, patch = scene.image[top + row, left:], lists.patch[wide * row :]
         for column in range(wide):
-            lists.patch[wide * row + column] = scene.image[top + row, left + column]
+            patch[column] = seen[column]
 
 
 @inlined
@@ -169,11 +181,13 @@ def _list(
     """Appends pixels of a block, whose first stands there in the patch, to the lists' n."""
     kind, offset, patch = look.kind, lists.offset, lists.patch
     corner, line = np.uint64(first), np.uint64(wide)
+    x, y, brightness, steep = lists.x[n:], lists.y[n:], lists.brightness[n:], lists.steep[n:]
     for j in range(count):
         k = np.uint64(lists.chosen[j])
-        lists.x[n + j], lists.y[n + j] = offset[k], offset[k + _BEYOND]
-        lists.brightness[n + j] = patch[corner + line * (k >> _ROW) + (k & _LAST)]
-        lists.steep[n + j] = np.float32(kind[np.uint32(lists.node[k])] == STEEP)
+        x[j], y[j] = offset[k], offset[k + _BEYOND]
+        brightness[j] = patch[corner + line * (k >> _ROW) + (k & _LAST)]
+        # a comparison would become a branch, which goes either way at every edge
+        steep[j] = np.float32(kind[np.uint32(lists.node[k])] // STEEP)
 
 
 @inlined

@@ -1,6 +1,7 @@
 """Fits the templates of all units to a frame, parts of them side by side."""
 
 import itertools
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import cv2
@@ -14,12 +15,12 @@ from pipeline.tracking.fit.patch_correlation import FitStart, PoseFits, Template
 from pipeline.tracking.fit.template import block_places
 from pipeline.tracking.fit.template_cells import TemplateCells
 from pipeline.tracking.geometry import Camera
-from sim.core import Floats, Mask
+from sim.core import Floats, Mask, Singles
 
 FULL_STEPS = 8
 _THREADS = min(4, cv2.getNumberOfCPUs())
-_FEWEST = 16
-"""Units that are worth a thread of their own."""
+_AT_ONCE = 16
+"""Units that a thread takes at once; the rest is left to whichever thread is free first."""
 
 
 class PoseFitter:
@@ -36,6 +37,7 @@ class PoseFitter:
         self.blocks = block_places(camera) if blocks is None else blocks
         self.full = np.zeros(len(templates.centre))
         self._threads = ThreadPoolExecutor(_THREADS)
+        self._singles = np.zeros((0, 0), np.float32)
 
     def start(self, gain: float) -> tuple[Floats, Floats]:
         """Returns pose and photometry to start from: at rest, all with the same gain."""
@@ -81,27 +83,46 @@ class PoseFitter:
         wanted = wanted if chosen is None else wanted & chosen
         out = np.full((units, patch_correlation.WIDTH), np.nan)
         if wanted.any():
-            scene = FramePixels(np.ascontiguousarray(image, np.float32), self.blocks)
-            parts = [
-                self._threads.submit(self._fit_part, scene, start, wanted, out, part)
-                for part in _shares(wanted)
+            scene = FramePixels(self._as_singles(image), self.blocks)
+            parts = _shares(wanted)
+            left, others = iter(parts), min(_THREADS, len(parts)) - 1
+            beside = [
+                self._threads.submit(self._fit_parts, scene, start, wanted, out, left)
+                for _ in range(others)
             ]
-            for done in parts:
+            self._fit_parts(scene, start, wanted, out, left)
+            for done in beside:
                 done.result()
         return patch_correlation.unpack(out)
 
-    def _fit_part(
-        self, scene: FramePixels, start: FitStart, wanted: Mask, out: Floats, part: slice
+    def _as_singles(self, image: Picture) -> Singles:
+        """Returns the picture in single precision, in memory that all frames share.
+
+        The system clears new memory of this size page by page, which takes longer than the copy.
+        """
+        if image.dtype == np.float32:
+            return np.ascontiguousarray(image, np.float32)
+        if self._singles.shape != image.shape:
+            self._singles = np.zeros(image.shape, np.float32)
+        np.copyto(self._singles, image)
+        return self._singles
+
+    def _fit_parts(
+        self, scene: FramePixels, start: FitStart, wanted: Mask, out: Floats, left: Iterator[slice]
     ) -> None:
-        """Fills the rows of a part of the units; loops over pixels hold no interpreter's lock."""
-        begin = FitStart(*(values[part] for values in start))
-        across = int(2 * begin.radius[wanted[part]].max()) // SIZE + 3
-        looks = _part_of(self.templates, part)
+        """Fills the rows of parts of the units as long as some are left, which threads share.
+
+        Loops over pixels hold no interpreter's lock.
+        """
+        across = int(2 * start.radius[wanted].max()) // SIZE + 3
         lists = pixel_lists(across**2)
-        room = fit_buffers(len(lists.x), looks.weight[0].size)
-        patch_correlation.fit_patches(
-            scene, looks, begin, wanted[part], FULL_STEPS, lists, room, out[part]
-        )
+        room = fit_buffers(len(lists.x), self.templates.weight[0].size)
+        for part in left:
+            begin = FitStart(*(values[part] for values in start))
+            looks = _part_of(self.templates, part)
+            patch_correlation.fit_patches(
+                scene, looks, begin, wanted[part], FULL_STEPS, lists, room, out[part]
+            )
 
 
 def _part_of(looks: Templates, units: slice) -> Templates:
@@ -119,6 +140,6 @@ def _part_of(looks: Templates, units: slice) -> Templates:
 def _shares(wanted: Mask) -> list[slice]:
     """Splits units (units,) into ranges with about as many to be fitted in each."""
     places = np.flatnonzero(wanted)
-    count = max(1, min(_THREADS, len(places) // _FEWEST))
+    count = max(1, len(places) // _AT_ONCE)
     ends = [0, *(int(part[0]) for part in np.array_split(places, count)[1:]), len(wanted)]
     return [slice(*pair) for pair in itertools.pairwise(ends)]

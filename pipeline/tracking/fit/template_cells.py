@@ -15,6 +15,8 @@ EMPTY, FLAT, STEEP = np.uint8(0), np.uint8(1), np.uint8(2)
 _STEEP, _NOISY, _MEAN_NOISY = 0.04, 3.0, 1.5
 """Change from node to node in a cell that tells of the place, at least: in contrasts of the unit;
 in standard deviations of the template's noise; and in these, if it is the mean of four changes."""
+_LANES = 8
+"""Nodes that a processor unfolds at once: what is left of a row costs as much for each."""
 
 NodeSpans: TypeAlias = NDArray[np.int32]
 
@@ -100,14 +102,16 @@ def unfold(brightness: Singles, weight: Singles, span: NodeSpans, nodes: Singles
     """Fills nodes (4 rows columns,) in the spans: brightness, its slopes in x and y, and weight.
 
     The slopes are differences of fourth order, per node. One unit's nodes at a time fit a
-    processor's cache, which all units' do not; beyond the spans they stay as they are.
+    processor's cache, which all units' do not. Beyond the spans, which are filled up to what a
+    processor does at once, they stay as they are.
     """
     near, far, size = np.float32(8 / 12), np.float32(1 / 12), brightness.shape[1]
     faces, masks = brightness.reshape(-1), weight.reshape(-1)
     for row in range(2, size - 2):
-        count, first = span[row, 1] - span[row, 0], size * row + span[row, 0]
+        begin, count = span[row, 0], span[row, 1] - span[row, 0]
         if count <= 0:
             continue
+        count, first = min(-(-count // _LANES) * _LANES, size - 2 - begin), size * row + begin
         at, mask, out = faces[first:], masks[first:], nodes[4 * first :]
         left, right = faces[first - 1 :], faces[first + 1 :]
         farther_left, farther_right = faces[first - 2 :], faces[first + 2 :]
