@@ -8,6 +8,9 @@ from sim.core import Floats, Ints, Mask, Reals
 STEADY, DUPLICATE, DROPPED = range(3)
 """Timing of a frame: as the file says; shows the instant before again; a frame is missing."""
 
+_TICK, _FEWEST = 0.6e-3, 4
+"""Seconds by which a stamp is off where milliseconds are counted, about half of one; frames that
+show it."""
 _LONGEST = 4
 """Frames in a row that may repeat one; more show that nothing moves."""
 _GAP, _SELDOM = 1.7, 0.1
@@ -27,6 +30,9 @@ _EVEN = 0.2
 sets in, ends or jumps."""
 _JOLTING = 0.25
 """Squared residuals on either side of a gap, over those across it; motion is rough where more."""
+_ASTRAY = 0.5
+"""How far a motion may be off what the speeds before and after a gap tell, at most, over the way at
+the higher of them."""
 _BETTER = 0.2
 """A gap must make the squared residuals of smooth motion so much smaller."""
 
@@ -62,6 +68,19 @@ def timing_faults(time: Floats, motion: Reals, sigma: Reals, same: Mask) -> Ints
     return out
 
 
+def unrounded(time: Floats) -> Floats:
+    """Returns times (frames,), s, that stamps of a steady rate, or with gaps, are rounded from.
+
+    Some containers count milliseconds: what moves by 40 px a frame seems to jump by half a pixel.
+    Stamps that are farther off than that from an even spacing are as the camera took them.
+    """
+    if len(time) < _FEWEST or np.median(np.diff(time)) <= 0:
+        return time
+    step = np.cumsum(np.round(np.diff(time, prepend=time[0]) / np.median(np.diff(time))))
+    even = np.polyval(np.polyfit(step, time, 1), step)
+    return even - even[0] if np.abs(even - time).max() < _TICK else time
+
+
 def _repeated(same: Mask) -> Mask:
     """Marks pictures that are shown again, but for long runs of one: there nothing moves."""
     run = np.split(np.arange(len(same)), np.flatnonzero(np.diff(same)) + 1)
@@ -91,7 +110,8 @@ def _late(clock: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
         ):
             most = min(_BETTER * rough[0], (_SMOOTH * noise[shown[middle]]) ** 2)
             sides = [_roughness(clock[window[part]], near[part], 2) for part in (~after, after)]
-            out[shown[middle]] = min(rough[1:]) < most and max(sides) < _JOLTING * rough[0]
+            leads = _leads_on(near, _GAPS[int(np.argmin(rough))])
+            out[shown[middle]] = min(rough) < most and max(sides) < _JOLTING * rough[0] and leads
     return out
 
 
@@ -101,6 +121,18 @@ def _goes_on(motion: Floats, noise: float) -> bool:
     half = len(motion) // 2
     before, after = np.median(steps[: half - 1]), np.median(steps[half:])
     return bool(min(before, after) > max(_EVEN * max(before, after), _VISIBLE * noise))
+
+
+def _leads_on(motion: Floats, missing: int) -> bool:
+    """Checks that motions (frames, n) reach the second half by about the speeds at both ends.
+
+    A polynomial joins any two straight ways smoothly if only the gap is long enough.
+    """
+    half = len(motion) // 2
+    before, across, after = np.diff(motion, axis=0)[half - 2 : half + 1]
+    off = across - (missing + 1) * (before + after) / 2
+    quickest = max(np.linalg.norm(before), np.linalg.norm(after))
+    return bool(np.linalg.norm(off) < _ASTRAY * (missing + 1) * quickest)
 
 
 def _roughness(clock: Floats, motion: Floats, degree: int = _DEGREE) -> float:

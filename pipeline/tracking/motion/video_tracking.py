@@ -22,7 +22,7 @@ from pipeline.tracking.frames import BrokenOffError, Frame
 from pipeline.tracking.geometry import SpecimenOutlines, arm_swing
 from pipeline.tracking.motion import uncertainty
 from pipeline.tracking.motion.camera_motion import camera_variance, remove_camera_motion, row_times
-from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults
+from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults, unrounded
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.motion_modes import count_at_rest
 from pipeline.tracking.motion.time_interpolation import at_frame_times, middle_speed
@@ -139,7 +139,8 @@ def track_video(
     later = likeness[1:][np.isfinite(likeness[1:])]
     coded = not len(later) or float(np.median(later)) > _CODED
     own = shown.averaged / (shown.averaged + 1) / rest  # a frame's noise, over that of residuals
-    sigma = uncertainty.calibrate_sigma(motion, sigmas, specimen.centre, steady, time, own, coded)
+    even = unrounded(time)
+    sigma = uncertainty.calibrate_sigma(motion, sigmas, specimen.centre, steady, even, own, coded)
     if setup.follows_supports and setup.held is not None:
         missed += camera_variance(sigma, specimen.centre, setup.held)
     sigma = np.where(np.isfinite(motion), np.hypot(sigma, np.sqrt(missed)), np.nan)

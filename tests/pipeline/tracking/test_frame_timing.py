@@ -106,6 +106,25 @@ def test_the_turning_points_of_a_swing_are_no_faults(frames: int) -> None:
     assert faults(moved) == {}
 
 
+@pytest.mark.parametrize("back", [0.35, 2.0])
+def test_a_return_to_set_out_another_way_is_no_gap(back: float) -> None:
+    """A stage goes ten steps along x, returns at once and goes along y."""
+    moved = np.zeros((22, len(CENTRE), 3))
+    moved[:11, :, 0] = back / 10 * np.arange(11)[:, None]
+    moved[11:, :, 1] = back / 10 * np.arange(11)[:, None]
+    moved += 0.02 * NOISE * back * np.random.default_rng(6).normal(size=moved.shape)
+    assert faults(moved) == {}
+
+
+@pytest.mark.parametrize("rate", [30.0, 60.0, 240.0])
+def test_stamps_that_count_milliseconds_are_evened(rate: float) -> None:
+    """But those of a camera that dropped frames keep the gaps, and others are as they are."""
+    steady = np.delete(np.arange(200.0), [70, 71, 130]) / rate
+    np.testing.assert_allclose(frame_timing.unrounded(np.round(steady, 3)), steady, atol=2e-4)
+    varying = np.cumsum(np.random.default_rng(3).uniform(0.9, 1.1, 200)) / rate
+    assert (frame_timing.unrounded(varying) == varying).all()
+
+
 def test_stated_uncertainty_is_that_of_the_noise() -> None:
     moved, steady = motion(np.arange(FRAMES, dtype=float)), np.ones(FRAMES, dtype=bool)
     seen_badly = moved.copy()
