@@ -140,15 +140,20 @@ def template_weight(
     return np.asarray(weight, np.float32)
 
 
-def outline_templates(grid: TemplateGrid, blur: float, pixel: float) -> Templates:
-    """Draws bright outlines on a dark ground, blurred; only a band about the edges has weight.
+def outline_templates(grid: TemplateGrid, blur: float, pixel: float, bright: bool) -> Templates:
+    """Draws blurred outlines, one where it is bright and zero where it is dark.
+
+    Slopes of the light scale what is bright: an edge of dark units that were drawn as ones would be
+    shifted by them. Only a band about the edges has weight.
 
     Args:
         grid: the nodes.
         blur: standard deviation of the camera's blur, mm.
         pixel: size of a pixel, mm.
+        bright: whether the units are brighter than what is behind them.
     """
     faces = np.stack([blurred_silhouette(grid, inside, blur) for inside in grid.inside])
+    faces = faces if bright else 1 - faces
     outside = _REACH * blur + 0.5 * pixel
     weight = _smooth(grid.inside, -outside - pixel, -outside)
     weight *= 1 - _smooth(grid.inside, outside, outside + pixel)

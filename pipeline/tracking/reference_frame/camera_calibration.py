@@ -81,7 +81,7 @@ def calibrate_camera(
     is their own tolerance and stays in the residual. Where the set-up tells of thick units, their
     outlines are those of faces and walls together, if that is what the frame shows.
     """
-    camera, gain = with_distortion(specimen, detection).camera, _gain(image, detection)
+    camera, gain = with_distortion(specimen, detection).camera, _gain(image)
     pixel, blocks = _pixel(specimen, camera), block_places(camera)
     some = np.arange(0, specimen.count, -(-specimen.count // _SOME))
 
@@ -94,7 +94,8 @@ def calibrate_camera(
         grid = TemplateGrid(specimen, 1 / pixel, reach, depth)
         few, least, best = grid.of(some), np.inf, BLURS[0]
         for blur in BLURS:
-            fitter = PoseFitter(camera, outline_templates(few, blur * pixel, pixel), blocks)
+            drawn = outline_templates(few, blur * pixel, pixel, detection.bright)
+            fitter = PoseFitter(camera, drawn, blocks)
             misfit = _misfit(fitter.fit(image, *fitter.start(gain)))
             if misfit > least:
                 break
@@ -110,7 +111,7 @@ def calibrate_camera(
             with_walls = fit_blur(thick)
             if with_walls[0] < least:
                 depth, (least, blur, grid) = thick, with_walls
-    templates = outline_templates(grid, blur * pixel, pixel)
+    templates = outline_templates(grid, blur * pixel, pixel, detection.bright)
     for turn in range(_ROUNDS + 1):
         fitter = PoseFitter(camera, templates)
         fits = fitter.fit(image, *fitter.start(gain))
@@ -137,7 +138,7 @@ def best_orientations(
     lens = with_distortion(specimen, max(detections, key=lambda one: one.score)).camera
     pixel = _pixel(specimen, detections[0].camera)
     grid = TemplateGrid(specimen, 1 / pixel, (3 * _USUAL_BLUR + 2) * pixel)
-    templates = outline_templates(grid, _USUAL_BLUR * pixel, pixel)
+    templates = outline_templates(grid, _USUAL_BLUR * pixel, pixel, detections[0].bright)
     wrong = [_unlikeness(image, specimen, templates, lens, one) for one in detections]
     return [
         one for one, found in zip(detections, wrong, strict=True) if found <= _ALIKE * min(wrong)
@@ -154,7 +155,7 @@ def _unlikeness(
     """Multiplies residuals of outlines by rotations: outlines of others are turned to fit."""
     camera = lens.facing(specimen.centre[detection.unit], detection.blob)
     fitter = PoseFitter(camera, templates)
-    fits = fitter.fit(image, *fitter.start(_gain(image, detection)))
+    fits = fitter.fit(image, *fitter.start(_gain(image)))
     found = np.isfinite(fits.pose[:, 2])
     if found.mean() < _FOUND:
         return np.inf
@@ -162,9 +163,9 @@ def _unlikeness(
     return _misfit(fits) * float(np.mean(np.abs(turned - np.median(turned))))
 
 
-def _gain(image: Picture, detection: LatticeDetection) -> float:
+def _gain(image: Picture) -> float:
     low, high = np.percentile(image[::_SPARSE, ::_SPARSE], [5, 95])
-    return float(high - low) * (1 if detection.bright else -1)
+    return float(high - low)
 
 
 def _misfit(fits: PoseFits) -> float:

@@ -5,13 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.tracking.clip_scripts import SCRIPTS
 from benchmarks.tracking.rendering import Renderer, View, eight_bit, pose_bound
-from benchmarks.tracking.wild_clips import WildClip, errors, make, specimen, tracked
+from benchmarks.tracking.wild_clips import WildClip, errors, film, make, specimen, tracked
 from pipeline.runtime import UserError
 from pipeline.tracking.detect import detect_lattice
 from pipeline.tracking.fit import frame_fit
 from pipeline.tracking.motion import Track, track_video
 from pipeline.tracking.reference_frame import RecordingSetup
+from sim.core import Singles
 from tests.tables import cases
 
 
@@ -42,7 +44,12 @@ def test_threads_change_no_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize(
     ("name", "frames"),
-    [("stick_slip", 24), ("rolling_shutter", 14), ("motion_blur_untold", 14), ("hand", 12)],
+    [
+        ("stick_slip", 24),
+        ("rolling_shutter", 14),
+        ("motion_blur_untold", 14),
+        ("hand", 12),
+    ],
 )
 def test_sigma_holds(name: str, frames: int, tmp_path: Path) -> None:
     clip, track = shown(name, tmp_path, frames)
@@ -61,6 +68,18 @@ def test_a_specimen_is_found_without_a_scale_however_small_it_is() -> None:
 def test_the_blur_of_a_camera_is_measured(tmp_path: Path) -> None:
     _, track = shown("soft_focus", tmp_path, 2)
     assert track.calibration.blur / track.calibration.pixel == pytest.approx(1.1, rel=0.2)
+
+
+def test_a_slope_of_the_light_does_not_move_outlines(tmp_path: Path) -> None:
+    """Else dark units seem off their places, and swing about these when they turn."""
+
+    def shade(image: Singles, time: float) -> None:
+        row = np.arange(len(image), dtype=np.float32)[:, None]
+        image *= 1 + np.float32(0.15) * np.sin(row / 50 + np.float32(time))
+
+    script = SCRIPTS["plain"]._replace(cover=shade, times=np.zeros(1))
+    clip = film(script, tmp_path / "unused.mkv")
+    assert np.abs(tracked(clip).calibration.residual).mean() < 0.01
 
 
 def test_the_bound_of_squares_is_that_of_their_edges() -> None:
