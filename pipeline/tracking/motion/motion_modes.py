@@ -26,6 +26,8 @@ _REACHES = (1, 2, 3, 4, 5, 6)
 _TELLING = 4
 """Fewest frames that tell how much a polynomial of higher order leaves."""
 _LITTLE_MORE = 1.3
+_SINGULAR, _TOLD = 1e6, 4.0
+"""Condition of what tells no shapes apart; largest variance of an amplitude that is told."""
 _JOLT = 3.0
 _TOGETHER = 3.0
 """Likeness of neighbours' changes that is motion, over its standard deviation by chance."""
@@ -51,17 +53,29 @@ def separate_modes(motion: Floats, near: Ints, noise: float) -> MotionModes:
     """
     known = np.isfinite(motion)
     full = filled(motion)
-    for _ in range(_FILLINGS):
+    for most in [_MOST] if known.all() else np.minimum(range(1, _FILLINGS), _MOST):
         left, values, right = np.linalg.svd(full, full_matrices=False)
         floor = max(_EMERGING * float(np.median(values)), noise * np.sqrt(full.shape).sum())
-        count = _leading(values / floor, right[: min(_MOST, len(values) // 2)], near)
+        count = _leading(values / floor, right[: min(most, len(values) // 2)], near)
         amplitude, shape = left[:, :count] * values[:count], right[:count]
         low = amplitude @ shape
         change = np.sqrt(np.mean((full - low)[~known] ** 2)) if count and not known.all() else 0.0
-        full = np.where(known, motion, low)
-        if change < _FILLED * noise:
+        full = np.where(known, motion, _completed(full, known, values[:count], shape, noise))
+        if change < _FILLED * noise and count < most:
             break
     return MotionModes(amplitude, shape, full - low)
+
+
+def _completed(full: Floats, known: Mask, values: Floats, shape: Floats, noise: float) -> Floats:
+    """Returns motions (frames, units) by shapes (n, units) whose amplitudes the known units tell.
+
+    Amplitudes are as likely large as their singular values (n,) say, and the less certain, the
+    nearer to zero.
+    """
+    prior = np.diag(len(full) * noise**2 / values**2)
+    normal = np.einsum("fu,iu,ju->fij", known, shape, shape, optimize=True) + prior
+    told = np.linalg.solve(normal, (np.where(known, full, 0.0) @ shape.T)[..., None])[..., 0]
+    return np.asarray(told @ shape)
 
 
 def _leading(height: Floats, vectors: Floats, near: Ints) -> int:
@@ -130,26 +144,35 @@ def constant_share(amplitude: Floats) -> float:
     return float(np.sum(basis.sum(axis=0) ** 2) / len(basis))
 
 
-def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats) -> Floats:
+def amplitude_variance(known: Mask, shape: Floats) -> Floats:
+    """Returns the variance (frames, n) of the amplitudes that known units (frames, units) tell.
+
+    It is over that of a frame that shows all; NaN where too few do to tell the shapes apart.
+    """
+    out = np.full((len(known), len(shape)), np.nan)
+    for frame, units in enumerate(known):
+        normal = shape[:, units] @ shape[:, units].T
+        if len(shape) and np.linalg.cond(normal) < _SINGULAR:
+            out[frame] = np.diag(np.linalg.inv(normal))
+    return np.where(out < _TOLD, out, np.nan)
+
+
+def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats, variance: Floats) -> Floats:
     """Measures amplitudes (frames, n) against polynomials in time through those beside, per frame.
 
     The order is the lowest that leaves little more than the next ones: more is motion. Where even
     the last one may be, as the motion is too quick or too short, the jitter is taken to be as
     large. A jolt is motion too, so values are held to a few times the usual; frames at the ends are
-    as the next.
+    as the next. Values are those of a frame that shows all units, by the amplitudes' variance.
     """
-    found = [_differences(amplitude, steady, time, reach) for reach in _REACHES]
+    found = [_differences(amplitude, steady, time, reach, variance) for reach in _REACHES]
     usual = np.full((len(found), amplitude.shape[1]), np.inf)
     for order, one in enumerate(found):
-        told = np.isfinite(one).all(axis=1)
-        if told.sum() >= _TELLING:
-            usual[order] = np.median(np.abs(one[told]), axis=0) / 0.6745
-    last = int(np.isfinite(usual[:, :1]).sum()) - 1
+        told = np.isfinite(one).sum(axis=0) >= _TELLING
+        usual[order, told] = np.nanmedian(np.abs(one[:, told]), axis=0) / 0.6745
     out = np.zeros_like(amplitude)
-    for column in range(amplitude.shape[1]):
+    for column in np.flatnonzero(np.isfinite(usual[0])):
         order = int(np.argmax(usual[:, column] <= _LITTLE_MORE * usual[:, column].min()))
-        if last < 0:
-            continue
         values, most = found[order][:, column], _JOLT * usual[order, column]
         known = np.nonzero(np.isfinite(values))[0]
         values = np.interp(np.arange(len(values)), known, values[known])
@@ -157,8 +180,13 @@ def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats) -> Floats:
     return out
 
 
-def _differences(amplitude: Floats, steady: Mask, time: Floats, reach: int) -> Floats:
-    """Returns divided differences (frames, n) over so many frames to either side, unit norm."""
+def _differences(
+    amplitude: Floats, steady: Mask, time: Floats, reach: int, variance: Floats
+) -> Floats:
+    """Returns divided differences (frames, n) over so many frames to either side.
+
+    Their variance is that of an amplitude whose own is one.
+    """
     out = np.full_like(amplitude, np.nan)
     for frame in range(reach, len(amplitude) - reach):
         window = slice(frame - reach, frame + reach + 1)
@@ -168,5 +196,5 @@ def _differences(amplitude: Floats, steady: Mask, time: Floats, reach: int) -> F
         ):
             apart = time[window, None] - time[None, window] + np.eye(2 * reach + 1)
             weights = 1 / np.prod(apart / np.abs(apart).max(), axis=1)
-            out[frame] = weights @ amplitude[window] / np.linalg.norm(weights)
+            out[frame] = weights @ amplitude[window] / np.sqrt(weights**2 @ variance[window])
     return out

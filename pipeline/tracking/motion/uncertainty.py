@@ -29,9 +29,9 @@ _USUAL = 6.0
 """By how much codecs make variances larger than the image tells, and the weight of this belief in
 frames: few frames do not show how their errors drift."""
 _USUAL_FRAMES = 2.0
+_FRAMES_OWN = 0.5
+"""Least part of the variance by the image that is a frame's own, the rest being the reference's."""
 _LEAST_FREEDOM = 0.2
-_SEEN = 0.9
-"""Part of the units of the fullest frame that one must show to tell of the shapes' amplitudes."""
 _OWN = 0.3
 _JITTER = 4.0
 """Variance by which a codec shows frames at other times, at most, over that of its noise; what is
@@ -81,11 +81,9 @@ def calibrate_sigma(
     time = np.arange(len(motion), dtype=float) if time is None else time
     parts = np.array_split(np.arange(len(motion)), -(-len(motion) // _MOST_FRAMES))
     for part in (slice(frames[0], frames[-1] + 1) for frames in parts):
-        for dof in range(motion.shape[2]):
-            calm = _calmed(sigma[part, :, dof].astype(float))
-            shown = motion[part, :, dof].astype(float)
-            variance, common = _factors(shown, calm, near, steady[part], time[part], coded)
-            out[part, :, dof] = calm * np.sqrt(variance + reference * common)
+        told = motion[part].astype(float), _calmed(sigma[part].astype(float))
+        found = _found(*told, near, steady[part], time[part], coded)
+        out[part] = told[1] * np.sqrt(found[0] + reference * found[1])
     return out
 
 
@@ -107,47 +105,68 @@ def _calmed(sigma: Floats) -> Floats:
     return np.exp(frame + unit + _OWN * (told - frame - unit))
 
 
-def _factors(
+def _found(
     motion: Floats, sigma: Floats, near: Ints, steady: Mask, time: Floats, coded: bool
-) -> tuple[Floats, float]:
-    """Returns factors (frames, units) by which variances of one dof are too small.
+) -> tuple[Floats, Floats]:
+    """Returns factors (frames, units, 3) by which variances are too small.
 
-    Beside, the share of the reference frame's own error that the motion's shapes take up.
+    Beside, the share (3,) of the reference frame's own error that the motion's shapes take up.
+    Less scatter than a frame's own noise has is no codec's: residuals are alike within blocks by
+    what they do not hold of the light, and tell too much of the reference's error as well.
     """
-    told = _USUAL if coded else 1.0
-    usual = np.full(motion.shape, told)
-    if len(motion) < _LEAST_FRAMES or not np.isfinite(motion).any():
-        return usual, 0.0
-    found = motion_modes.separate_modes(motion, near, float(np.nanmedian(sigma)))
-    ratio = _ratio(np.isfinite(motion), sigma, found, steady & coded, time)
-    if not np.isfinite(ratio).any():
-        return usual, 0.0
-    level = float(np.nanmean(ratio))
+    usual = _USUAL if coded else 1.0
+    factors, shares, levels = np.full(motion.shape, usual), np.zeros(3), np.full(3, np.nan)
+    for dof in range(3 if len(motion) >= _LEAST_FRAMES else 0):
+        shown, told = motion[..., dof], sigma[..., dof]
+        if not np.isfinite(shown).any():
+            continue
+        found = motion_modes.separate_modes(shown, near, float(np.nanmedian(told)))
+        noise = _noise(np.isfinite(shown), found)
+        if coded:
+            noise += _jitter(noise, found, steady, time)
+        ratio = _ratio(noise, told)
+        if not np.isfinite(ratio).any():
+            continue
+        levels[dof] = level = float(np.nanmean(ratio[1:]))  # the first frame is the reference
+        factors[..., dof] = _factors(ratio, level, usual)
+        shares[dof] = motion_modes.constant_share(found.amplitude)
+    if coded and np.median(levels) < _FRAMES_OWN:
+        return _found(motion, sigma, near, steady, time, coded=False)
+    return factors, shares * np.fmin(levels / _FRAMES_OWN, 1.0)
+
+
+def _factors(ratio: Floats, level: float, usual: float) -> Floats:
+    """Returns factors (frames, units) by frame and unit, drawn near to what is usual."""
     by_frame = _shrunk(ratio, level, 1)
     by_unit = _shrunk(ratio / by_frame[:, None], 1.0, 0)
-    belief = (level * len(ratio) + told * _USUAL_FRAMES) / (len(ratio) + _USUAL_FRAMES)
-    factors = by_frame[:, None] * by_unit[None, :] * belief / level
-    return factors, motion_modes.constant_share(found.amplitude)
+    belief = (level * len(ratio) + usual * _USUAL_FRAMES) / (len(ratio) + _USUAL_FRAMES)
+    return np.asarray(by_frame[:, None] * by_unit[None, :] * belief / level)
 
 
-def _ratio(
-    known: Mask,
-    sigma: Floats,
-    found: motion_modes.MotionModes,
-    steady: Mask,
-    time: Floats,
-) -> Floats:
-    """Returns squared noise over the image's variance (frames, units), NaN if unseen."""
+def _noise(known: Mask, found: motion_modes.MotionModes) -> Floats:
+    """Returns squared noise (frames, units) in what the shapes leave, NaN if unseen."""
     by_frame, by_unit = motion_modes.leverage(found.amplitude), motion_modes.leverage(found.shape.T)
     freedom = (1 - by_frame)[:, None] * (1 - by_unit)
-    followed = steady & (known.sum(axis=1) > _SEEN * known.sum(axis=1).max())  # no made up ones
-    jitter = (motion_modes.amplitude_jitter(found.amplitude, followed, time) @ found.shape) ** 2
     noise = found.rest**2 / np.maximum(freedom, _LEAST_FREEDOM)
-    if known.any():  # white noise shakes the shapes' amplitudes too, and is counted in the rest
-        usual = float(np.mean(noise[known]))
-        jitter = np.clip(jitter - by_unit * usual, 0.0, _JITTER * usual)
-    spread = noise + jitter
-    ratio = np.where(known & (freedom > _LEAST_FREEDOM), spread / sigma**2, np.nan)
+    return np.where(known & (freedom > _LEAST_FREEDOM), noise, np.nan)
+
+
+def _jitter(noise: Floats, found: motion_modes.MotionModes, steady: Mask, time: Floats) -> Floats:
+    """Returns the variance (frames, units) by which frames are shown at other times.
+
+    White noise shakes the shapes' amplitudes too, and is counted already.
+    """
+    known = np.isfinite(noise)
+    told = motion_modes.amplitude_variance(known, found.shape)
+    moved = motion_modes.amplitude_jitter(found.amplitude, steady, time, told) @ found.shape
+    usual = float(np.nanmean(noise))
+    own = motion_modes.leverage(found.shape.T) * usual
+    return np.clip(moved**2 - own, 0.0, _JITTER * usual)
+
+
+def _ratio(spread: Floats, sigma: Floats) -> Floats:
+    """Returns squared noise over the image's variance (frames, units), held to a few times it."""
+    ratio = spread / sigma**2
     if not np.isfinite(ratio).any():
         return ratio
     return np.minimum(ratio, _OUTLIER * np.nanmedian(ratio) / _CHI_SQUARE)

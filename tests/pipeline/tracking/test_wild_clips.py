@@ -49,6 +49,8 @@ def test_threads_change_no_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         ("rolling_shutter", 14),
         ("motion_blur_untold", 14),
         ("hand", 12),
+        ("mains_flicker", 24),
+        ("returns_h264", 48),
     ],
 )
 def test_sigma_holds(name: str, frames: int, tmp_path: Path) -> None:
