@@ -29,4 +29,5 @@ from .verdicts import Tally as Tally
 from .verdicts import Wanted as Wanted
 from .verdicts import attempt as attempt
 from .verdicts import attempted as attempted
+from .verdicts import endless_family as endless_family
 from .verdicts import family as family

@@ -9,6 +9,7 @@ import json
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from pipeline.runtime import write_atomically
 
 ENOUGH = 0.99
 """Share of the cases in range that must be solved, of each family and of all."""
+TRIES = 100
+"""Tries of a family of random scenes."""
 SCHEMA_VERSION = 1
 FAMILIES: dict[str, StressFamily] = {
     family.name: family
@@ -46,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"error: no family {', '.join(unknown)}; there are {known}", file=sys.stderr)
         return 2
     chosen = [family for name, family in FAMILIES.items() if not args.names or name in args.names]
-    tallies = [_tally(family, args.small, args.only) for family in chosen]
+    tallies = [_tally(family, args) for family in chosen]
     record = {"schema_version": SCHEMA_VERSION, "families": [_record(each) for each in tallies]}
     with write_atomically(args.out) as aside:
         aside.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
@@ -56,11 +59,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 1 if failures and not args.tolerant else 0
 
 
-def _tally(family: StressFamily, small: bool, only: str) -> Tally:
+def _tally(family: StressFamily, args: argparse.Namespace) -> Tally:
     """Attempts the cases of a family, and tells of those that are not solved."""
     start, outcomes = time.process_time(), []
-    for case in family.cases(small):
-        if only in case.name:
+    drawn = (
+        (args.first, args.first + args.tries) if family.endless and not args.small else (0, None)
+    )
+    for case in islice(family.cases(args.small), *drawn):
+        if args.only in case.name:
             outcomes.append(outcome := attempted(case))
             if outcome.verdict != "solved":
                 _tell(f"{family.name}: {case.name}: {outcome.verdict}: {outcome.message}")
@@ -128,6 +134,8 @@ def _parser() -> argparse.ArgumentParser:
     add, out = parser.add_argument, Path("results/stress/stress.json")
     add("names", nargs="*", metavar="family", help="which; all by default")
     add("--small", action="store_true", help="a few cases of each family")
+    add("--tries", type=int, default=TRIES, metavar="N", help="of a random family (%(default)s)")
+    add("--first", type=int, default=0, metavar="SEED", help="of these tries (%(default)s)")
     add("--tolerant", action="store_true", help="end well whatever is found: the page shows it")
     add("--only", default="", metavar="TEXT", help="cases with it in their name")
     add("--out", type=Path, default=out, help="the counts (default %(default)s)")

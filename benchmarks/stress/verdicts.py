@@ -88,6 +88,7 @@ class StressFamily(NamedTuple):
     tried: str
     judged: str
     cases: Cases
+    endless: bool = False  # whether its cases are drawn at random, as many as are asked for
 
 
 _TEXTS = yaml.safe_load(Path(__file__).with_name("families.yaml").read_text(encoding="utf-8"))
@@ -98,6 +99,11 @@ def family(cases: Cases) -> StressFamily:
     name, known = cases.__name__, vars(sys.modules[cases.__module__])
     texts = {key: text.format_map(known) for key, text in _TEXTS[name].items()}
     return StressFamily(name, **texts, cases=cases)
+
+
+def endless_family(cases: Cases) -> StressFamily:
+    """Decorates a function that draws cases without an end."""
+    return family(cases)._replace(endless=True)
 
 
 @dataclass(frozen=True)

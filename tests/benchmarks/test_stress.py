@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -165,6 +166,23 @@ def test_a_wrong_answer_fails_the_suite(
     assert "wrong: toy: bad: error: 2, limit 1" in capsys.readouterr().out
     assert suite.main(["tides"]) == 2
     assert "no family tides" in capsys.readouterr().err
+
+
+def test_as_many_random_scenes_are_tried_as_are_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drawn = StressFamily(
+        "toy",
+        "",
+        "",
+        lambda _: (StressCase(f"draw {seed}", lambda: found(0.5)) for seed in count()),
+        endless=True,
+    )
+    monkeypatch.setattr(suite, "FAMILIES", {"toy": drawn})
+    out = tmp_path / "stress.json"
+    assert suite.main(["--tries", "3", "--first", "7", "--out", str(out)]) == 0
+    assert "toy: 3 cases" in capsys.readouterr().err
+    assert json.loads(out.read_text(encoding="utf-8"))["families"][0]["solved"] == 3
 
 
 def test_units_without_a_ligament_are_refused_by_every_solver() -> None:
