@@ -292,5 +292,9 @@ SCRIPTS |= {
     ),
     "fist_in_noise": SCRIPTS["hand_over_a_corner"]._replace(view=View(noise=(8.0, 0.12))),
     "returns_h264": SCRIPTS["leaves_and_returns"]._replace(film=("libx264", "yuv420p", 20)),
+    "returns_fast": ClipScript(
+        shift=_glide(140.0, 0.7), times=_LONG, film=("libx264", "yuv420p", 16)
+    ),
+    "off_a_corner": ClipScript(shift=_off_corner, times=_LONG, film=("libx264", "yuv420p", 20)),
 }
 """The clips by name."""

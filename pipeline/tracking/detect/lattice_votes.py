@@ -30,7 +30,7 @@ _FRONTIER = 1.7
 """Units are reached from matches so far, over the length of a joint, or of the widest gap."""
 _TURNS_KEPT, _SHIFTS_KEPT = 0.6, 0.75
 """Votes of further candidates, over those of the best."""
-_MOST_SHIFTS, _MOST_SEEDS = 16, 3
+_MOST_SHIFTS, _MOST_SEEDS = 32, 3
 _SURE = 0.98
 """Score, over the number of units, after which no other shift is tried."""
 _NEAREST, _RIDGE = 8, 0.05
@@ -88,13 +88,25 @@ def locate_lattice(
             _Growth(points, joint, gap, turned + shift, patches, pitch * abs(factor) / scale)
             for shift in _shifts(turned, patches, _BIN * pitch)
         ]
-        for seed in sorted(seeds, key=lambda one: one.rank(inside))[:_MOST_SEEDS]:
+        for seed in _likeliest(seeds, inside):
             grown = seed.placement(factor, inside)
             if grown is not None:
                 found.append(grown)
             if grown is not None and grown.score > _SURE * len(points):
                 break
     return sorted(found, key=lambda one: -one.score)
+
+
+def _likeliest(seeds: list["_Growth"], inside: Inside) -> list["_Growth"]:
+    """Returns the seeds of best rank, and that of most matches less what is missing.
+
+    A column alone in view matches each of the lattice's; what is missing beside it tells which.
+    """
+    if not seeds:
+        return []
+    ranked = sorted(seeds, key=lambda one: one.rank(inside))
+    net = min(ranked, key=lambda one: sum(one.rank(inside)))
+    return [net, *(seed for seed in ranked[:_MOST_SEEDS] if seed is not net)]
 
 
 def match_one_to_one(expected: Floats, found: Floats, gate: float) -> tuple[Ints, Ints]:
@@ -187,7 +199,10 @@ class _Growth:
 
         A lens or a load takes units off the linear map, so ones missing do not outweigh matches.
         """
-        return -self.size, int((inside(self._linear) & (self._patch < 0)).sum())
+        known = self._patch >= 0
+        off = self._patches[self._patch[known]] - self._linear[known]
+        place = self._linear + np.median(off, axis=0) if len(off) else self._linear
+        return -self.size, int((inside(place) & ~known).sum())
 
     def placement(self, factor: complex, inside: Inside) -> Placement | None:
         """Returns the match at its largest; nothing if it is small."""

@@ -60,6 +60,8 @@ _OWN_TURNS = np.deg2rad([0, 15, -15, 30, -30])
 but the first unless nearly all are in view, since a lattice turned so may lie a unit aside."""
 _OTHER_TURN = np.deg2rad(20.0)
 """Between turns at which a lattice may look alike."""
+_MOST_TURN = np.deg2rad(45.0)
+"""Within a frame of a specimen in sight: half of the turn that leaves squares as they were."""
 _CLOSE = 0.5
 """Two units nearer to each other than this part of their least distance at rest are one."""
 _ROUNDS = 40
@@ -173,6 +175,8 @@ class Tracker:
         jumped = good.mean() < _FEW
         if jumped and not first:
             fits, good = self._relocalise(image, fits, good)
+        if self._out_of_sight and good.sum() <= _HALF * self._relocaliser.in_view(self._pose).sum():
+            good[:] = False  # a few may be others, a unit aside
         good &= ~self._neighbours.collisions(fits.pose, good, _CLOSE)
         quality = self._reasons(fits, good)
         if self._slopes is not None and not first:
@@ -290,6 +294,8 @@ class Tracker:
         """Tries all units anew where the lattice is found; keeps what is more."""
         now = np.where(good[:, None], fits.pose, np.nan)
         places = self._relocaliser.placed_again(image, self._whole, now)
+        if not self._out_of_sight:  # from one frame to the next it turns by less than to look alike
+            places = [place for place in places if self._turned_since(place) < _MOST_TURN]
         if not places:
             return fits, good
         before = self._pose
@@ -307,6 +313,11 @@ class Tracker:
                 return best.fits, new
         self._pose = before
         return fits, good
+
+    def _turned_since(self, place: LatticePlace) -> float:
+        """Returns the angle by which a lattice would have turned since the frame before, rad."""
+        turns = np.exp(1j * (place.pose - self._pose)[:, 2])
+        return float(np.abs(np.angle(turns.mean())))
 
     def _tried(
         self, image: Picture, fits: PoseFits, places: list[LatticePlace], own: float

@@ -10,10 +10,11 @@ from benchmarks.tracking.rendering import Renderer, View, eight_bit, pose_bound
 from benchmarks.tracking.wild_clips import WildClip, errors, film, make, specimen, tracked
 from pipeline.runtime import UserError
 from pipeline.tracking.detect import detect_lattice
+from pipeline.tracking.detect.lattice_votes import locate_lattice
 from pipeline.tracking.fit import frame_fit
 from pipeline.tracking.motion import Track, track_video
 from pipeline.tracking.reference_frame import RecordingSetup
-from sim.core import Singles
+from sim.core import Floats, Mask, Singles
 from tests.tables import cases
 
 
@@ -70,6 +71,22 @@ def test_a_specimen_is_found_without_a_scale_however_small_it_is() -> None:
 def test_the_blur_of_a_camera_is_measured(tmp_path: Path) -> None:
     _, track = shown("soft_focus", tmp_path, 2)
     assert track.calibration.blur / track.calibration.pixel == pytest.approx(1.1, rel=0.2)
+
+
+@pytest.mark.parametrize("seed", [3, 13])
+def test_a_column_alone_in_view_is_found_unturned(seed: int) -> None:
+    """Though it matches each of the lattice's columns, and turned ones as well."""
+    squares = specimen()
+    uneven = np.random.default_rng(seed).normal(0.0, 0.3, squares.centre.shape)
+    seen = squares.centre + np.array([84.0, -1.0]) + uneven
+    column = seen[squares.centre[:, 0] < squares.centre[:, 0].min() + 1.0]
+
+    def inside(place: Floats) -> Mask:
+        return np.asarray(place[..., 0] < column[:, 0].max() + 5.0)
+
+    found = locate_lattice(squares.centre, squares.joint, column, 1.0, inside)
+    right = [one for one in found if one.score == 9 and abs(one.turn) < 0.1]
+    assert any(np.abs(one.place - seen).max() < 4.0 for one in right)
 
 
 def test_a_slope_of_the_light_does_not_move_outlines(tmp_path: Path) -> None:
