@@ -30,7 +30,7 @@ _FRONTIER = 1.7
 """Units are reached from matches so far, over the length of a joint, or of the widest gap."""
 _TURNS_KEPT, _SHIFTS_KEPT = 0.6, 0.75
 """Votes of further candidates, over those of the best."""
-_MOST_SHIFTS, _MOST_SEEDS = 32, 3
+_MOST_SHIFTS, _MOST_SEEDS = 256, 3
 _SURE = 0.98
 """Score, over the number of units, after which no other shift is tried."""
 _NEAREST, _RIDGE = 8, 0.05
