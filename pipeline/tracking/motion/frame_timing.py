@@ -31,8 +31,8 @@ sets in, ends or jumps."""
 _JOLTING = 0.25
 """Squared residuals on either side of a gap, over those across it; motion is rough where more."""
 _ASTRAY = 0.5
-"""How far a motion may be off what the speeds before and after a gap tell, at most, over the way at
-the higher of them."""
+"""Largest offset of a motion from what the speeds before and after a gap tell, over the way at the
+higher of them."""
 _BETTER = 0.2
 """A gap must make the squared residuals of smooth motion so much smaller."""
 
