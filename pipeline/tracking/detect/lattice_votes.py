@@ -102,11 +102,10 @@ def _likeliest(seeds: list["_Growth"], inside: Inside) -> list["_Growth"]:
 
     A column alone in view matches each of the lattice's; what is missing beside it tells which.
     """
-    if not seeds:
-        return []
-    ranked = sorted(seeds, key=lambda one: one.rank(inside))
-    net = min(ranked, key=lambda one: sum(one.rank(inside)))
-    return [net, *(seed for seed in ranked[:_MOST_SEEDS] if seed is not net)]
+    ranks = {seed: seed.rank(inside) for seed in seeds}
+    ranked = sorted(seeds, key=ranks.__getitem__)
+    net = min(ranked, key=lambda one: sum(ranks[one]), default=None)
+    return [*([net] if net else []), *(one for one in ranked[:_MOST_SEEDS] if one is not net)]
 
 
 def match_one_to_one(expected: Floats, found: Floats, gate: float) -> tuple[Ints, Ints]:

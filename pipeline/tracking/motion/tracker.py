@@ -306,12 +306,10 @@ class Tracker:
             if enough:
                 break
         best = max(tried, key=lambda trial: trial.good.sum()) if not enough else enough[0]
-        few = self._out_of_sight and not self._relocaliser.in_view(best.place.pose).all()
-        if few and self._turned_since(best.place) > _MOST_TURN:
-            clear = False  # turned otherwise it may be another part of the lattice
-        else:
-            clear = len(enough) < 2 or self._is_least_turn(best.place, enough[1].place)
-        if clear:
+        guessed = self._out_of_sight and not self._relocaliser.in_view(best.place.pose).all()
+        # turned otherwise it may be another part of the lattice
+        guessed = guessed and self._turned_since(best.place) > _MOST_TURN
+        if not guessed and (len(enough) < 2 or self._is_least_turn(best.place, enough[1].place)):
             self._pose = best.place.pose
             new = self._complete(image, best.fits, best.good)
             if new.sum() > good.sum():
