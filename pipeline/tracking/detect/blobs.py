@@ -7,8 +7,7 @@ import numpy as np
 
 from pipeline.runtime import Picture
 from pipeline.tracking.detect.lattice_votes import locate_lattice
-from pipeline.tracking.geometry import Camera, SpecimenOutlines
-from pipeline.tracking.geometry import camera as cameras
+from pipeline.tracking.geometry import Camera, SpecimenOutlines, fit_camera, fit_homography
 from sim.core import Floats, Image, Ints, Mask
 
 _UPRIGHT = 10  # deg
@@ -140,7 +139,7 @@ def _detections(
             if any(abs(np.angle(np.exp(1j * (one.turn - turn)))) < _OTHER for turn in turns):
                 continue
             turns.append(one.turn)
-            matrix = cameras.fit_homography(specimen.centre[one.unit], patches[one.patch])
+            matrix = fit_homography(specimen.centre[one.unit], patches[one.patch])
             seen = replace(camera, homography=matrix)
             areas = np.abs(np.linalg.det(seen.jacobian(specimen.centre[one.unit]))) / scale**2
             if areas.min() > 1 / _AREA and areas.max() < _AREA:
@@ -164,7 +163,7 @@ def _detections(
 def with_distortion(specimen: SpecimenOutlines, detection: LatticeDetection) -> LatticeDetection:
     """Refits the camera of a detection with distortion."""
     seen = specimen.centre[detection.unit]
-    camera = cameras.fit_camera(seen, detection.blob, detection.camera.size, _BLOB_SIGMA)
+    camera = fit_camera(seen, detection.blob, detection.camera.size, _BLOB_SIGMA)
     return replace(detection, camera=camera)
 
 

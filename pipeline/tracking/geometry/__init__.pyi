@@ -1,9 +1,12 @@
-from . import camera as camera
 from .camera import Camera as Camera
 from .camera import camera_of as camera_of
-from .camera import fit_camera as fit_camera
+from .camera_fit import cameras_alike as cameras_alike
+from .camera_fit import fit_camera as fit_camera
+from .camera_fit import lens_variance as lens_variance
+from .camera_fit import pixel_noise as pixel_noise
 from .depth import Depth as Depth
 from .depth import estimate_depth as estimate_depth
+from .homography import fit_homography as fit_homography
 from .rigid_fit import arm_swing as arm_swing
 from .rigid_fit import rigid_motion as rigid_motion
 from .rigid_fit import robust_motion as robust_motion

@@ -12,21 +12,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import least_squares
 
+from pipeline.tracking.geometry.homography import fit_homography
 from sim.core import Floats
 
 _INVERSE_STEPS = 8
-_CENTRE_PRIOR = 0.03
-"""Standard deviation of the distortion's centre about the middle of the image, in image sizes."""
-_DISTORTION_PRIOR = 0.3
 _TINY = 1e-9
 _STEEPEST = 1.55
 """Angle to the axis of a fisheye beyond which nothing of a plane is seen, rad."""
-_FISHEYE = (0.7, 0.5)
-"""A usual one, from which to start, and the standard deviation of the prior."""
-_BETTER = 0.6
-"""A fisheye's squared residuals must be so much smaller than those of the usual lens."""
 
 
 @dataclass(frozen=True)
@@ -124,93 +117,3 @@ def camera_of(dataset: xr.Dataset) -> Camera | None:
     first, second, *fisheye = dataset["camera_radial"].values.tolist()
     centre = dataset["camera_centre"].values
     return Camera(homography, centre, np.array([first, second]), (width, height), *fisheye)
-
-
-def fit_camera(
-    points: Floats, pixels: Floats, size: tuple[int, int], sigma: float, start: Camera | None = None
-) -> Camera:
-    """Fits the camera that sees the points at the pixels, by robust least squares.
-
-    The usual lens is taken, unless a fisheye leaves much less of a residual; a start has one kind.
-
-    Args:
-        points: (n, 2) mm, at least four, not on a line.
-        pixels: (n, 2) where they are seen.
-        size: of the image, px.
-        sigma: standard uncertainty of the pixels; weighs the weak prior of centre and distortion
-            (both near the middle, none) and tells outliers.
-        start: a camera near the solution; by default the best homography.
-    """
-    if start is not None:
-        return _fit_lens(points, pixels, sigma, start)
-    homography, middle = fit_homography(points, pixels), (np.array(size) - 1) / 2
-    usual, fisheye = (
-        _fit_lens(points, pixels, sigma, Camera(homography, middle, np.zeros(2), size, kind))
-        for kind in (0.0, _FISHEYE[0])
-    )
-    left, left_fisheye = (
-        float(np.median(np.square(one.project(points) - pixels).sum(axis=1)))
-        for one in (usual, fisheye)
-    )
-    return fisheye if left_fisheye < _BETTER * left else usual
-
-
-def _fit_lens(points: Floats, pixels: Floats, sigma: float, start: Camera) -> Camera:
-    """Fits a camera of the kind of the start."""
-    size = start.size
-    span = np.abs(points - points.mean(axis=0)).max()
-    scaling = np.array([1, 1, span, 1, 1, span, 1 / span, 1 / span]) / span
-    unit = np.concatenate([scaling * start.scale, np.full(2, start.scale), np.ones(3)])
-    unit[6:8] = 1 / span
-    middle = (np.array(size) - 1) / 2
-
-    def camera(vector: Floats) -> Camera:
-        values = vector * unit
-        matrix = np.append(values[:8], 1.0).reshape(3, 3)
-        return Camera(matrix, values[8:10], values[10:12], size, values[12] * bool(start.fisheye))
-
-    def residuals(vector: Floats) -> Floats:
-        made = camera(vector)
-        prior = np.concatenate(
-            [
-                (made.centre - middle) / (_CENTRE_PRIOR * max(size)),
-                made.radial / _DISTORTION_PRIOR,
-                [(vector[12] - start.fisheye) / _FISHEYE[1]],
-            ]
-        )
-        return np.concatenate([((made.project(points) - pixels) / sigma).ravel(), prior])
-
-    given = [start.homography.ravel()[:8], start.centre, start.radial, np.array([start.fisheye])]
-    first = np.concatenate(given) / unit
-    near = least_squares(residuals, first, x_scale="jac", xtol=1e-12)
-    found = least_squares(residuals, near.x, loss="soft_l1", f_scale=3.0, x_scale="jac", xtol=1e-12)
-    return camera(found.x)
-
-
-def fit_homography(points: Floats, pixels: Floats) -> Floats:
-    """Fits the homography (3, 3) of points to pixels (n, 2), n >= 4, linear least squares."""
-    to_points, to_pixels = _normaliser(points), _normaliser(pixels)
-    x, y = apply_homography(to_points, points).T
-    u, v = apply_homography(to_pixels, pixels).T
-    one, zero = np.ones_like(x), np.zeros_like(x)
-    rows = np.concatenate(
-        [
-            np.stack([x, y, one, zero, zero, zero, -u * x, -u * y, -u], axis=1),
-            np.stack([zero, zero, zero, x, y, one, -v * x, -v * y, -v], axis=1),
-        ]
-    )
-    found = np.linalg.svd(rows, full_matrices=False)[2][-1].reshape(3, 3)
-    found = np.linalg.inv(to_pixels) @ found @ to_points
-    return found / found[2, 2]
-
-
-def _normaliser(points: Floats) -> Floats:
-    middle = points.mean(axis=0)
-    scale = 1 / np.abs(points - middle).mean()
-    return np.array([[scale, 0, -scale * middle[0]], [0, scale, -scale * middle[1]], [0, 0, 1.0]])
-
-
-def apply_homography(matrix: Floats, points: Floats) -> Floats:
-    """Maps points (n, 2) to pixels (n, 2) without distortion."""
-    mapped = points @ matrix[:2, :2].T + matrix[:2, 2]
-    return mapped / (points @ matrix[2, :2] + matrix[2, 2])[:, None]

@@ -19,7 +19,7 @@ from pipeline.tracking.detect import (
 )
 from pipeline.tracking.fit import ExposureBlur, PoseFitter, SideWalls, learn_templates
 from pipeline.tracking.frames import BrokenOffError, Frame
-from pipeline.tracking.geometry import SpecimenOutlines, arm_swing
+from pipeline.tracking.geometry import SpecimenOutlines, arm_swing, lens_variance
 from pipeline.tracking.motion import uncertainty
 from pipeline.tracking.motion.camera_motion import camera_variance, remove_camera_motion, row_times
 from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults, unrounded
@@ -53,8 +53,9 @@ _CODED = 1.8
 """Likeness from which on a codec is at work."""
 _UNSURE = 0.25
 """Standard deviation of a pose that is not known at its frame's time, px."""
-_VAGUE = 5.0
-"""Or so many times the usual."""
+_VAGUE = 1 / 6, 5.0
+"""Standard deviation of a pose that is as good as lost, px, and over the usual: three of these are
+half a pixel."""
 _CHANGED = 0.005
 """Part of the pixels that differ in a picture that is shown again, at most."""
 
@@ -132,6 +133,7 @@ def track_video(
                 100 * unsure.mean(),
             )
     _count_from_rest(motion, rest, offset)
+    missed += _lens_variance(specimen, calibration, motion)
     remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     qualities[np.isnan(motion[..., 0]) & (qualities == GOOD)] = HIDDEN  # as the supports are
     faults = timing_faults(time, motion, sigmas, same)
@@ -150,11 +152,28 @@ def track_video(
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended)
 
 
+def _lens_variance(
+    specimen: SpecimenOutlines, calibration: CameraCalibration, motion: Reals
+) -> Floats:
+    """Computes variances of motions by the camera's, and warns where these are too large."""
+    camera, alike = calibration.camera, calibration.alike
+    variance = lens_variance(camera, alike, specimen.centre, motion)
+    far = variance[..., :2].max(axis=-1) > (_VAGUE[0] * calibration.pixel) ** 2
+    if far.any():
+        LOG.warning(
+            "%.2g %% of the poses are lost, as they lie where the specimen at rest does not tell"
+            " how the lens bends the picture: start where it fills more of it",
+            100 * far.mean(),
+        )
+    return variance
+
+
 def _vague(sigma: Reals, pixel: float) -> Mask:
     """Marks poses (frames, units) of which next to nothing is known, beside the others."""
     place = sigma[..., :2].max(axis=-1) / pixel
     known = np.isfinite(place)
-    return known & (place > max(_UNSURE, _VAGUE * float(np.median(place[known]))))
+    least, times = _VAGUE
+    return known & (place > max(least, times * float(np.median(place[known]))))
 
 
 def _exposure(tracker: Tracker, motion: Reals, times: Floats) -> float:

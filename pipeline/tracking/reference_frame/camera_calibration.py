@@ -14,7 +14,15 @@ from pipeline.tracking.fit import (
     block_places,
     outline_templates,
 )
-from pipeline.tracking.geometry import Camera, Depth, SpecimenOutlines, estimate_depth, fit_camera
+from pipeline.tracking.geometry import (
+    Camera,
+    Depth,
+    SpecimenOutlines,
+    cameras_alike,
+    estimate_depth,
+    fit_camera,
+    pixel_noise,
+)
 from sim.core import Floats, Mask
 
 BLURS = (0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 2.9)
@@ -30,7 +38,7 @@ _SOME = 40
 _SPARSE = 4
 """Every so manyth row and column tells how bright a picture is."""
 _EDGE_SIGMA = 0.02
-"""How well the outlines of a unit place it, px: tells which are outliers, no more."""
+"""How well the outlines of a unit place it at best, px."""
 
 
 class CameraCalibration(NamedTuple):
@@ -44,6 +52,7 @@ class CameraCalibration(NamedTuple):
     depth: Depth | None  # of thick units whose walls are of the shade of their faces
     bright: bool  # whether the units are brighter than what is behind them
     outlines: PoseFits  # how these were fitted, from where the design has them
+    alike: list[Camera]  # others that may have seen them, each a standard deviation off
 
 
 class RecordingSetup(NamedTuple):
@@ -116,13 +125,15 @@ def calibrate_camera(
         fitter = PoseFitter(camera, templates)
         fits = fitter.fit(image, *fitter.start(gain))
         seen = camera.project(specimen.centre + fits.pose[:, :2])
+        good = np.isfinite(fits.pose[:, 0])
+        shown = specimen.centre[good], seen[good]
         if turn < _ROUNDS:
-            good = np.isfinite(fits.pose[:, 0])
-            places = specimen.centre[good]
-            camera = fit_camera(places, seen[good], camera.size, _EDGE_SIGMA, camera)
+            sigma = max(_EDGE_SIGMA, pixel_noise(*shown, camera))
+            camera = fit_camera(*shown, camera.size, sigma, camera)
     residual = seen - camera.project(specimen.centre)
+    alike = cameras_alike(*shown, camera)
     return CameraCalibration(
-        camera, grid, blur * pixel, pixel, residual, depth, detection.bright, fits
+        camera, grid, blur * pixel, pixel, residual, depth, detection.bright, fits, alike
     )
 
 

@@ -1,9 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.tracking.geometry import Camera, rigid_motion, robust_motion
-from pipeline.tracking.geometry import camera as cameras
+from pipeline.tracking.geometry import (
+    Camera,
+    cameras_alike,
+    fit_camera,
+    lens_variance,
+    rigid_motion,
+    robust_motion,
+)
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -31,8 +39,35 @@ def test_a_camera_is_found_from_what_it_sees(seed: int) -> None:
     camera = some_camera(random)
     points = np.stack(np.meshgrid(*2 * [np.linspace(0, 220, 10)]), axis=-1).reshape(-1, 2)
     pixels = camera.project(points)
-    found = cameras.fit_camera(points, pixels, camera.size, 1e-3)
+    found = fit_camera(points, pixels, camera.size, 1e-3)
     np.testing.assert_allclose(found.project(points), pixels, atol=2e-3)
+
+
+def test_a_lens_of_strong_distortion_is_no_outlier_of_the_prior() -> None:
+    camera = some_camera(np.random.default_rng(0))
+    camera = replace(camera, radial=np.array([-0.25, 0.06]))
+    points = np.stack(np.meshgrid(*2 * [np.linspace(20, 200, 9)]), axis=-1).reshape(-1, 2)
+    noise = 0.03 * np.random.default_rng(1).normal(size=points.shape)
+    found = fit_camera(points, camera.project(points) + noise, camera.size, 0.03)
+    np.testing.assert_allclose(found.radial, camera.radial, atol=0.01)
+
+
+def test_errors_of_a_lens_are_as_large_as_their_variance_says() -> None:
+    """A small specimen in the middle travels to the corner of the picture, and turns on the way."""
+    random, ratios = np.random.default_rng(2), []
+    points = np.stack(np.meshgrid(*2 * [np.linspace(80, 140, 5)]), axis=-1).reshape(-1, 2)
+    motion = np.tile([70.0, -60.0, 0.2], (1, len(points), 1))
+    for _ in range(30):
+        camera = some_camera(random)
+        seen = camera.project(points) + 0.05 * random.normal(size=points.shape)
+        found = fit_camera(points, seen, camera.size, 0.05)
+        alike = cameras_alike(points, seen, found)
+        told = np.sqrt(lens_variance(found, alike, points, motion))[0, :, :2]
+        moved = found.unproject(camera.project(points + motion[0, :, :2]))
+        error = moved - found.unproject(camera.project(points)) - motion[0, :, :2]
+        assert told.max() > 0.02  # a tenth of a pixel
+        ratios.append(np.mean((error / told) ** 2))
+    assert 0.7 < np.sqrt(np.mean(ratios)) < 1.4
 
 
 @given(seeds)

@@ -1,0 +1,160 @@
+"""Fits the camera that sees known points of a plane, and tells which others may have seen them."""
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+from scipy.optimize import least_squares
+
+from pipeline.tracking.geometry.camera import Camera
+from pipeline.tracking.geometry.homography import fit_homography
+from sim.core import Floats, Reals
+
+_CENTRE_PRIOR = 0.03
+"""Standard deviation of the distortion's centre about the middle of the image, in image sizes."""
+_USUAL_DISTORTION = 0.02
+"""Scale of the prior of the radial coefficients, whose tails are Cauchy's: most lenses bend by some
+per cent at most, and few by a third."""
+_FISHEYE = (0.7, 0.5)
+"""A usual one, from which to start, and the standard deviation of the prior."""
+_BETTER = 0.6
+"""A fisheye's squared residuals must be so much smaller than those of the usual lens."""
+_MAD = 1.4826
+_NODES, _STEP = 48, 0.5
+"""Of a grid over the places of a specimen, each way; mm of a difference."""
+
+
+def fit_camera(
+    points: Floats, pixels: Floats, size: tuple[int, int], sigma: float, start: Camera | None = None
+) -> Camera:
+    """Fits the camera that sees the points at the pixels, by robust least squares.
+
+    The usual lens is taken, unless a fisheye leaves much less of a residual; a start has one kind.
+
+    Args:
+        points: (n, 2) mm, at least four, not on a line.
+        pixels: (n, 2) where they are seen.
+        size: of the image, px.
+        sigma: standard uncertainty of the pixels; weighs the prior of centre and distortion (both
+            near the middle, little) and tells outliers.
+        start: a camera near the solution; by default the best homography.
+    """
+    if start is not None:
+        return _Lens(points, pixels, sigma, start).fitted()
+    homography, middle = fit_homography(points, pixels), (np.array(size) - 1) / 2
+    usual, fisheye = (
+        _Lens(points, pixels, sigma, Camera(homography, middle, np.zeros(2), size, kind)).fitted()
+        for kind in (0.0, _FISHEYE[0])
+    )
+    left, left_fisheye = (
+        float(np.median(np.square(one.project(points) - pixels).sum(axis=1)))
+        for one in (usual, fisheye)
+    )
+    return fisheye if left_fisheye < _BETTER * left else usual
+
+
+def pixel_noise(points: Floats, pixels: Floats, camera: Camera) -> float:
+    """Estimates the standard deviation of pixels (n, 2) about where a fitted camera sees points."""
+    off = camera.project(points) - pixels
+    free = max(off.size - _Lens.count, 1) / off.size
+    return _MAD * float(np.median(np.abs(off))) / np.sqrt(free)
+
+
+def cameras_alike(points: Floats, pixels: Floats, camera: Camera) -> list[Camera]:
+    """Returns cameras a standard deviation from a fitted one, along the axes of its covariance.
+
+    What each of them makes of a picture, less what the fitted one does, is an independent error.
+    """
+    lens = _Lens(points, pixels, max(pixel_noise(points, pixels, camera), 1e-9), camera)
+    return lens.alike()
+
+
+def lens_variance(camera: Camera, alike: list[Camera], centre: Floats, motion: Reals) -> Floats:
+    """Computes variances (frames, units, 3) of motions by the doubt about a camera, mm and rad.
+
+    Away from where it was fitted its distortion is extrapolated, and a unit that travels through
+    the picture seems to move by the change of that error.
+
+    Args:
+        camera: by which the motions were found.
+        alike: others that are a standard deviation off, each by an error of its own.
+        centre: (units, 2) places at rest, mm.
+        motion: (frames, units, 3) from there, NaN where missing.
+    """
+    out = np.full(motion.shape, np.nan)
+    known = np.isfinite(motion[..., 0])
+    rest = np.broadcast_to(centre, (*motion.shape[:2], 2))[known]
+    if not len(rest):
+        return out
+    now = rest + motion[known][:, :2]
+    both = np.concatenate([now, rest])
+    low, high = both.min(axis=0), both.max(axis=0)
+    axes = np.linspace(low, high, _NODES)
+    nodes = np.stack(np.meshgrid(*axes.T, indexing="ij"), axis=-1)
+    cells = np.maximum(high - low, 1e-9) / (_NODES - 1)
+    here, there = ((place - low).T / cells[:, None] for place in (now, rest))
+    total = np.zeros((len(rest), 3))
+    for other in alike:
+        for dof, field in enumerate(_errors(camera, other, nodes)):
+            change = map_coordinates(field, here, order=1) - map_coordinates(field, there, order=1)
+            total[:, dof] += change**2
+    out[known] = total
+    return out
+
+
+class _Lens:
+    """Scales the parameters of a camera, and computes residuals of what it sees and of its prior.
+
+    The camera is of the kind of the start.
+    """
+
+    count = 12
+
+    def __init__(self, points: Floats, pixels: Floats, sigma: float, start: Camera) -> None:
+        self._points, self._pixels, self._sigma, self._start = points, pixels, sigma, start
+        span = np.abs(points - points.mean(axis=0)).max()
+        scaling = np.array([1, 1, span, 1, 1, span, 1 / span, 1 / span]) / span
+        self._unit = np.concatenate([scaling * start.scale, np.full(2, start.scale), np.ones(3)])
+        self._unit[6:8] = 1 / span
+        matrix, fisheye = start.homography.ravel()[:8], np.array([start.fisheye])
+        self._first = np.concatenate([matrix, start.centre, start.radial, fisheye]) / self._unit
+
+    def fitted(self) -> Camera:
+        """Fits it by robust least squares."""
+        near = least_squares(self._residuals, self._first, x_scale="jac", xtol=1e-12)
+        found = least_squares(
+            self._residuals, near.x, loss="soft_l1", f_scale=3.0, x_scale="jac", xtol=1e-12
+        )
+        return self._camera(found.x)
+
+    def alike(self) -> list[Camera]:
+        """Returns the start moved along each axis of its covariance, the inverse of J^T J."""
+        jacobian = least_squares(self._residuals, self._first, max_nfev=1).jac
+        _, size, axes = np.linalg.svd(jacobian, full_matrices=False)
+        return [self._camera(self._first + axis / s) for s, axis in zip(size, axes, strict=True)]
+
+    def _camera(self, vector: Floats) -> Camera:
+        values, start = vector * self._unit, self._start
+        matrix = np.append(values[:8], 1.0).reshape(3, 3)
+        fisheye = values[12] * bool(start.fisheye)
+        return Camera(matrix, values[8:10], values[10:12], start.size, fisheye)
+
+    def _residuals(self, vector: Floats) -> Floats:
+        made, start = self._camera(vector), self._start
+        off = ((made.project(self._points) - self._pixels) / self._sigma).ravel()
+        aside = (made.centre - (np.array(start.size) - 1) / 2) / (_CENTRE_PRIOR * max(start.size))
+        bent = made.radial / _USUAL_DISTORTION
+        bent = np.sign(bent) * np.sqrt(np.log1p(bent**2))
+        return np.concatenate([off, aside, bent, [(vector[12] - start.fisheye) / _FISHEYE[1]]])
+
+
+def _errors(camera: Camera, other: Camera, places: Floats) -> Floats:
+    """Returns by how much (3, ...) shift and rotation at places (..., 2) differ for two cameras."""
+
+    def shift(at: Floats) -> Floats:
+        pixels = other.project(at) - camera.project(at)
+        return np.asarray(np.linalg.solve(camera.jacobian(at), pixels[..., None])[..., 0])
+
+    x, y = np.array([_STEP, 0.0]), np.array([0.0, _STEP])
+    along = (shift(places + x) - shift(places - x))[..., 1]
+    across = (shift(places + y) - shift(places - y))[..., 0]
+    turn = (along - across) / (4 * _STEP)
+    return np.asarray(np.concatenate([np.moveaxis(shift(places), -1, 0), [turn]]))
