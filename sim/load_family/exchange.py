@@ -140,7 +140,9 @@ def minimise_worst(
     journal: Journal | None = None,
     callback: Callable[[Evaluation], None] | None = None,
 ) -> Result:
-    """Minimises the worst loss over a family of loads; returns the design whose worst is lowest.
+    """Minimises the worst loss over a family of loads; returns the best design that a search ended.
+
+    The best has the lowest worst loss, to which the drive's own loads add their share.
 
     The losses of an evaluation, ``aux``, are those of the drive's own loads, then of the others in
     the set; its loss is what is minimised over the set of the time.
@@ -184,11 +186,14 @@ def minimise_worst(
         result = minimise_loss("sqp", evaluate, constraints, x, options=descent, callback=record)
         x, known = result.x, float(result.aux.max())
         found = search(x, held.places)
+        own, added = np.split(result.aux, [len(scene.loads.cases)])
         LOG.info("worst of %d loads %.5g, found %.5g", len(held.places), known, found[0].loss)
-        if best is None or max(known, found[0].loss) < best[0]:
-            best = max(known, found[0].loss), replace(result, best=first + result.best)
+        worst, mean = max(known, found[0].loss), float(scene.loads.case_weights @ own)
+        merit = (1 - options.nominal) * worst + options.nominal * mean
+        if best is None or merit < best[0]:
+            best = merit, replace(result, best=first + result.best)
         stands = found[0].loss <= FOUND * known
-        held.exchange(result.aux[len(scene.loads.cases) :], found)
+        held.exchange(added, found)
     assert best is not None
     if not stands:
         LOG.warning("the worst load found is more than %g times those designed for", FOUND)

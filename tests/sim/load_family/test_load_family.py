@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +14,13 @@ from sim.load_family import (
     LoadLosses,
     SearchOptions,
     ascend,
+    exchange,
     minimise_worst,
     spread_places,
 )
 from sim.load_family.exchange import IDLE, LoadSet, without_copies
 from sim.load_family.worst_load import search_worst
-from sim.optimise import Evaluation, Journal, Result, SqpOptions
+from sim.optimise import Evaluation, Journal, Result, SqpOptions, minimise
 from sim.scene import Scene, parameters_of_design, simulate
 from sim.solvers import Harmonic, LinearRamp
 from tests.sim.scene.test_plan import design_of, scene
@@ -153,7 +155,9 @@ def test_a_load_leaves_the_set_when_it_did_no_harm_for_long() -> None:
 
 
 def minimised(
-    journal: Journal | None = None, callback: Callable[[Evaluation], None] | None = None
+    journal: Journal | None = None,
+    callback: Callable[[Evaluation], None] | None = None,
+    nominal: float = 0.0,
 ) -> Result:
     posed = scene(samples=21, accuracy="draft", symmetry="C4")
     search = SearchOptions(samples=4, ascents=1, evaluations=4)
@@ -162,7 +166,7 @@ def minimised(
         SHAKEN,
         Limits(edge_length=3.0, block_angle=0.5, void_angle=0.0, gap=0.2),
         sqp=SqpOptions(evaluations=8, radius=0.5),
-        options=FamilyOptions(evaluations=4, search=search),
+        options=FamilyOptions(nominal=nominal, evaluations=4, search=search),
         journal=journal,
         callback=callback,
     )
@@ -187,3 +191,18 @@ def test_the_worst_loss_is_minimised_and_resumed(tmp_path: Path) -> None:
     assert len(first.aux) > 4  # the drive's own four, and those found
     assert first.aux[4:].max() > first.aux[:4].max()
     assert best.aux.max() < 0.7 * first.aux.max()
+
+
+def test_a_share_of_the_own_loads_counts_in_which_design_is_best(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of two descents the second has the lower worst loss, and the higher own one."""
+    own, worst, place = iter((0.2, 0.5)), iter((1.0, 1.0, 0.9)), np.full(3, 0.5)
+
+    def descend(*words: object, **options: object) -> Result:
+        result = minimise(*words, **options)  # type: ignore[arg-type]
+        return replace(result, aux=np.full_like(result.aux, next(own)))
+
+    monkeypatch.setattr(exchange, "minimise_loss", descend)
+    monkeypatch.setattr(exchange, "search_worst", lambda *_: [FoundLoad(place, next(worst), place)])
+    assert minimised(nominal=0.9).best < 4
