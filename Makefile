@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml experiments/*/figure.yaml))))
 PAGES := all fig1 index movies calibrate validation benchmark any_load
-PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains certificate,$(addsuffix _$(product),$(STUDIES)))
+PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains certificate front,$(addsuffix _$(product),$(STUDIES)))
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
 INSTALL = $(BIN)/python pipeline/workflow/install_lock.py $(if $(WHEELS),--wheels "$(abspath $(WHEELS))")
@@ -27,6 +27,7 @@ help:
 	@echo "make fig2_sweep         losses over the parameters of a study's sweep, whichever they are"
 	@echo "make fig2_gains         what designs gain that hold against more than the study asks for"
 	@echo "make any_load  a cloak for loads in ranges: certified under 1000 random and 50 searched ones"
+	@echo "make fig2_front         what it costs to hold against any load: a front of designs, and what limits them"
 	@echo "make all       build every figure of the paper and the page over them: results/index.html"
 	@echo "make calibrate constants of the specimens from tests of small ones: results/calibration"
 	@echo "make validation  measured specimens beside their prediction: results/validation/index.html"

@@ -1,19 +1,22 @@
 """Reads the start of an optimisation: the initial lattice, or a design."""
 
+import logging
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.posing.structure_variables import flat_vertices
-from pipeline.posing.to_scene import lattice_of
+from pipeline.posing.structure_variables import designed_angles, flat_vertices, of_problem
 from pipeline.problem import Problem
 from pipeline.runtime import UserError
 from sim.core import Floats
 from sim.scene import Scene
 
+LOG = logging.getLogger(__name__)
+
 _SAME = 1e-9  # mm
+_STARTS = {"study": "study's own", "previous": "previous"}
 
 
 def shipped_vector(design: xr.Dataset) -> Floats:
@@ -26,16 +29,18 @@ def shipped_vector(design: xr.Dataset) -> Floats:
 def start_vector(asked: Problem, scene: Scene, path: Path | None, source: Path) -> Floats | None:
     """Reads the design vector (n_variables,) that an optimisation starts from, if it has one.
 
-    `path` is a design, where the problem starts from one; `source` is the problem's file.
+    `path` is a design, where the problem starts from one; `source` is the problem's file. Of a
+    design of another cloak or symmetry it is the closest vector, as far as this one allows.
 
     Raises:
         UserError: a design is wanted and not given, or given and not wanted, or it is one of other
-            units or another symmetry.
+            units.
     """
-    wanted = asked.optimiser.start == "study"
+    kind = asked.optimiser.start
+    wanted = kind != "initial"
     if wanted != (path is not None):
         what = (
-            "the problem starts from the study's own design"
+            f"the problem starts from the {_STARTS[kind]} design"
             if wanted
             else "a start is not asked for"
         )
@@ -44,11 +49,25 @@ def start_vector(asked: Problem, scene: Scene, path: Path | None, source: Path) 
     if path is None:
         return None
     design = datasets.read(path, "design")
-    vector, space = shipped_vector(design), scene.space
-    if len(vector) == space.n_variables and design.sizes["unit"] == lattice_of(asked).n_units:
-        there = flat_vertices(scene.lattice, design["vertices"])
-        if np.abs(np.asarray(space.vertices(vector)) - there).max() < _SAME:
-            return vector
-    what = "the study's own design has other variables than this one"
-    remedy = "keep lattice, void, cloak and symmetry, or start from the initial lattice"
-    raise UserError(what, file=source, key="optimiser.start", value="study", remedy=remedy)
+    if not of_problem(asked, design):
+        what = f"the {_STARTS[kind]} design is of another lattice or void"
+        remedy = "keep lattice and void, or start from the initial lattice"
+        raise UserError(what, file=source, key="optimiser.start", value=kind, remedy=remedy)
+    there, vector = flat_vertices(scene.lattice, design["vertices"]), shipped_vector(design)
+    if len(vector) != scene.space.n_variables or _distance(scene, vector, there) > _SAME:
+        vector = _closest(scene, design, there)
+        LOG.info("started %.3g mm off the design", _distance(scene, vector, there))
+    return vector
+
+
+def _closest(scene: Scene, design: xr.Dataset, vertices: Floats) -> Floats:
+    """Finds the design vector closest to a design, slots as turned as they are there."""
+    lattice, angles = scene.lattice, designed_angles(design)
+    shifts = np.zeros((lattice.n_groups, 2))
+    shifts[lattice.group] = vertices - lattice.vertices
+    return scene.space.project(shifts, None if angles is None else np.nan_to_num(angles))
+
+
+def _distance(scene: Scene, vector: Floats, vertices: Floats) -> float:
+    """Finds how far a vertex of a design vector is from where it is to be, at most."""
+    return float(np.abs(np.asarray(scene.space.vertices(vector)) - vertices).max())

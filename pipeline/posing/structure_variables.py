@@ -94,13 +94,20 @@ def read_design(asked: Problem, path: Path) -> xr.Dataset:
         UserError: it cannot be read, or is of another.
     """
     design = datasets.read(path, "design")
-    intact = lattice_of(asked)
-    start, found = intact.padded(intact.vertices), design["vertices_initial"].values
-    alike = found.shape == start.shape and np.allclose(found, start, atol=_ALIKE, equal_nan=True)
-    if not alike or np.isnan(flat_vertices(altered_lattice_of(asked), design["vertices"])).any():
+    if not of_problem(asked, design):
         remedy = "give a design of this problem: run python -m pipeline design again"
         raise UserError("the design is of another lattice or void", file=path, remedy=remedy)
     return design
+
+
+def of_problem(asked: Problem, design: xr.Dataset) -> bool:
+    """Tests that a design is one of the problem's lattice and void."""
+    intact = lattice_of(asked)
+    start, found = intact.padded(intact.vertices), design["vertices_initial"].values
+    alike = found.shape == start.shape and np.allclose(found, start, atol=_ALIKE, equal_nan=True)
+    units = altered_lattice_of(asked)
+    whole = not np.isnan(flat_vertices(units, design["vertices"])).any() if alike else False
+    return bool(alike and whole)
 
 
 def spread(values: Floats, lattice: Lattice, size: int, axis: int = 0) -> Floats:

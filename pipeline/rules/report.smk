@@ -82,8 +82,11 @@ rule family_report:
     log:
         "results/{name}{preset}/logs/report.log",
     wildcard_constraints:
+        # with the preset that asks for several: others of the study ask for one
         name=rule_inputs.any_of(
-            study.name for study, designs in studies.families().items() if designs
+            f"{study.name}(?=@{study.preset}/)" if study.preset else f"{study.name}(?=/)"
+            for study, designs in studies.families().items()
+            if designs
         ),
         preset=r"(@[A-Za-z_]\w*)?",
     threads: 1

@@ -45,3 +45,9 @@ for study in sorted({built.partition("@")[0] for built in studies.targets().valu
             f"{study}_gains"
         input:
             f"results/{study}/gains/index.html",
+
+    rule:
+        name:
+            f"{study}_front"
+        input:
+            f"results/{study}/front/index.html",

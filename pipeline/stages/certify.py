@@ -2,7 +2,7 @@
 
 import argparse
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -36,27 +36,46 @@ def work(args: argparse.Namespace) -> None:
         UserError: the problem asks for no family of loads, or a design is of another lattice.
     """
     asked = problem.load(args.problem, args.preset)
-    family = load_family(asked, args.problem.parent)
-    if family is None:
-        remedy = "add objective.loads, or name a preset that has it"
-        what = "the problem asks for no loads in ranges"
-        raise UserError(what, file=args.problem, key="objective.loads", remedy=remedy)
+    family = loads_in_ranges(asked, args.problem)
     paths = {"cloaked": args.design} | ({} if args.other is None else {"study": args.other})
-    key = " ".join(
-        (
-            problem.section_hash(asked, "certify"),
-            source_hash("pipeline.stages.certify"),
-            *map(provenance.file_hash, paths.values()),
-        )
-    )
-    folder = (
-        args.out.parent / ".journal" / f"certify_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
-    )
-    folder.mkdir(parents=True, exist_ok=True)
-    with Journal(folder / "losses.journal", key) as journal:
+    words = (problem.section_hash(asked, "certify"), source_hash("pipeline.stages.certify"))
+    with losses_journal(args.out, "certify", (*words, *file_hashes(paths))) as journal:
         made = certificate(asked, family, args.problem.parent, paths, journal, args.threads)
     origin = provenance.of_study(asked, "certify", parents=paths)
     datasets.write(made, args.out, "certificate", origin)
+
+
+def loads_in_ranges(asked: Problem, source: Path) -> LoadFamily:
+    """Builds the family of loads of a problem, whose file is `source`.
+
+    Raises:
+        UserError: it asks for none.
+    """
+    family = load_family(asked, source.parent)
+    if family is None:
+        remedy = "add objective.loads, or name a preset that has it"
+        what = "the problem asks for no loads in ranges"
+        raise UserError(what, file=source, key="objective.loads", remedy=remedy)
+    return family
+
+
+def losses_journal(out: Path, stage: str, words: Iterable[str]) -> Journal:
+    """Returns the journal of losses for a dataset, named by all that they depend on."""
+    key = " ".join(words)
+    folder = out.parent / ".journal" / f"{stage}_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
+    folder.mkdir(parents=True, exist_ok=True)
+    return Journal(folder / "losses.journal", key)
+
+
+def file_hashes(paths: Mapping[str, Path]) -> list[str]:
+    """Hashes the files of designs, in their order."""
+    return [provenance.file_hash(path) for path in paths.values()]
+
+
+def own_places(scene: Scene, family: LoadFamily) -> Floats:
+    """Finds the places (n_cases, n) of the drive's own loads in a family."""
+    motions = [each for each in scene.loads.motions if isinstance(each, DIRECTED)]
+    return np.array([family.place(motion) for motion in motions])
 
 
 def certificate(
@@ -72,14 +91,12 @@ def certificate(
     random = np.random.default_rng(SEED)
     loads = random.random((LOADS, family.size))
     starts = random.random((SEARCHES, family.size))
-    own = np.array(
-        [family.place(each) for each in scene.loads.motions if isinstance(each, DIRECTED)]
-    )
+    own = own_places(scene, family)
     rows = []
     with cli.progress(len(paths) * (LOADS + len(own) + SEARCHES), "loads") as bar:
         for path in paths.values():
             structure = structures_of(scene, read_design(asked, path))["cloaked"]
-            tried = _Design(*structure, family, journal, threads, bar.update)
+            tried = TriedDesign(*structure, family, journal, threads, bar.update)
             rows.append((tried.losses(loads), tried.losses(own), tried.searches(starts)))
     losses, nominal, found = (np.array(part) for part in zip(*rows, strict=True))
     made = xr.Dataset(
@@ -111,7 +128,7 @@ def _numbers(
     }
 
 
-class _Design:
+class TriedDesign:
     """Computes losses of one design under loads, in batches that a journal remembers."""
 
     def __init__(

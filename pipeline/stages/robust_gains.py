@@ -1,7 +1,7 @@
 """Stage: what the presets that ask for more than a study's own drive gain over its own design."""
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,7 +41,7 @@ def work(args: argparse.Namespace) -> None:
         UserError: no design of the study itself is given, or none of a preset, or a preset asks
             for nothing but the study's own drive.
     """
-    given = dict(_named(text) for text in args.designs)
+    given = named_designs(args.designs)
     if PLAIN not in given or len(given) == 1:
         what = "a design of the study itself and one of a preset are compared"
         remedy = "give plain=results/fig2/design.nc broadband=results/fig2@broadband/design.nc"
@@ -51,9 +51,10 @@ def work(args: argparse.Namespace) -> None:
     datasets.write(made, args.out, "gains", origin)
 
 
-def _named(text: str) -> tuple[str, Path]:
-    name, _, path = text.rpartition("=")
-    return name, Path(path)
+def named_designs(words: Iterable[str]) -> dict[str, Path]:
+    """Reads words such as ``plain=results/fig2/design.nc``: files by name."""
+    parts = (word.rpartition("=") for word in words)
+    return {name: Path(path) for name, _, path in parts}
 
 
 def gains(path: Path, designs: Mapping[str, Path]) -> xr.Dataset:

@@ -14,7 +14,7 @@ from tempfile import NamedTemporaryFile
 from snakemake.iocontainers import Wildcards
 
 from pipeline.problem import Problem, outputs, over_measured_constants, section_hash
-from pipeline.problem.sections import group_count
+from pipeline.problem.sections import design_name, group_count, split_name
 from pipeline.runtime import RUN_MARK, WORK, UserError
 from pipeline.workflow import study_lock
 from pipeline.workflow.recordings import shown_recordings
@@ -24,11 +24,14 @@ from pipeline.workflow.studies import (
     check_calibrations,
     check_names,
     check_targets,
+    families,
     problem_of,
     studies,
     together,
 )
 
+SHARE = "objective.loads.nominal"
+"""Sets the share of the drive's own loads, over which designs are a front."""
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
 
@@ -151,15 +154,24 @@ def designs(wildcards: Wildcards) -> list[str]:
 
 def start_design(wildcards: Wildcards) -> list[str]:
     """Names the design that an optimisation starts from, where that is not the initial lattice."""
-    wanted = problem_of(study_of(wildcards)).optimiser.start == "study"
-    return [f"results/{wildcards.name}/design.nc"] if wanted else []
+    study = study_of(wildcards)
+    start = problem_of(study).optimiser.start
+    preset, number = split_name(study.preset)
+    if start == "previous" and preset and number and number > 1:
+        return [f"results/{study.name}@{design_name(preset, number - 1)}/design.nc"]
+    return [] if start == "initial" else [f"results/{study.name}/design.nc"]
 
 
 def own_design(wildcards: Wildcards) -> list[str]:
-    """Names the design of the study itself, for a preset of the same lattice and void."""
-    mine, own = problem_of(study_of(wildcards)), problem_of(Study(wildcards.name))
+    """Names the design of the study itself, for a preset of the same lattice and void.
+
+    One of several designs of a preset stands beside the others, not beside the study's.
+    """
+    study = study_of(wildcards)
+    mine, own = problem_of(study), problem_of(Study(study.name))
     alike = (mine.lattice, mine.void) == (own.lattice, own.void)
-    return [f"results/{wildcards.name}/design.nc"] if alike and mine != own else []
+    wanted = alike and mine != own and split_name(study.preset)[1] is None
+    return [f"results/{study.name}/design.nc"] if wanted else []
 
 
 def robust_designs(wildcards: Wildcards) -> dict[str, str]:
@@ -169,6 +181,29 @@ def robust_designs(wildcards: Wildcards) -> dict[str, str]:
     held = [study for study in mine if problem_of(study).asks_more_than(own)]
     named = {study.preset: f"results/{study}/design.nc" for study in held}
     return {"plain": f"results/{wildcards.name}/design.nc", **named}
+
+
+def front_designs(wildcards: Wildcards) -> dict[str, str]:
+    """Lists the designs of presets that ask for several under loads in ranges."""
+    members = [each for group in _in_ranges(wildcards.name).values() for each in group]
+    return {each.preset: f"results/{each}/design.nc" for each in members}
+
+
+def front_certificates(wildcards: Wildcards) -> list[str]:
+    """Lists the certificates of the ends of a front: of the first and the last share of it."""
+    groups = _in_ranges(wildcards.name).items()
+    fronts = [group for study, group in groups if SHARE in (problem_of(study).designs or {})]
+    return [f"results/{group[k]}/certificate.nc" for group in fronts for k in (0, -1)]
+
+
+def _in_ranges(name: str) -> dict[Study, list[Study]]:
+    """Lists the presets of a study that ask for several designs under loads in ranges."""
+    several = {study: group for study, group in families().items() if group and study.preset}
+    return {
+        study: group
+        for study, group in several.items()
+        if study.name == name and problem_of(group[0]).objective.loads is not None
+    }
 
 
 def chunks(wildcards: Wildcards, most: int) -> list[str]:

@@ -19,7 +19,7 @@ from pipeline.workflow.recordings import RECORDINGS
 if TYPE_CHECKING:
     from pipeline.problem import Problem
 
-PRODUCTS = ("_fabrication", "_spectrum", "_sweep", "_gains", "_certificate", RECORDINGS)
+PRODUCTS = ("_fabrication", "_spectrum", "_sweep", "_gains", "_certificate", "_front", RECORDINGS)
 """Ends of the targets of a study beside its report."""
 ALL = "all"  # the target that builds every figure of the paper
 

@@ -12,7 +12,7 @@ SCHEMA_VERSION = 5
 Kind = (
     Literal["design", "design_method", "response", "sweep", "scatter", "verification", "spectrum"]
     | Literal["gains", "certificate", "specimen", "track", "truth", "comparison", "calibration"]
-    | Literal["population", "load_cycles", "pictures", "benchmark", "contest", "tracking"]
+    | Literal["front", "population", "load_cycles", "pictures", "benchmark", "contest", "tracking"]
 )
 Type = Literal["float64", "float32", "int64", "int8", "str"]
 

@@ -53,7 +53,7 @@ def load(path: str | Path, preset: str | None = None) -> Problem:
         raise explain_error(error, document, data, preset) from error
     if problem.sweep is not None:
         _check_sweep(problem.sweep, document, data, preset)
-    if preset is None and problem.optimiser.start == "study":
+    if preset is None and problem.optimiser.start != "initial":
         what, remedy = "a study cannot start from its own design", "say so in a preset of it"
         raise _user_error(document, preset, data, ("optimiser", "start"), what, remedy)
     for finding in find_faults(problem):

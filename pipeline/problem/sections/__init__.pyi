@@ -3,6 +3,7 @@ from . import sweep_cases as sweep_cases
 from .designs import Designs as Designs
 from .designs import design_count as design_count
 from .designs import design_name as design_name
+from .designs import split_name as split_name
 from .drives import DisplacementDrive as DisplacementDrive
 from .drives import Drive as Drive
 from .drives import ForceDrive as ForceDrive

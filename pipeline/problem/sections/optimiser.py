@@ -40,7 +40,9 @@ class Optimiser(Section):
 
     Attributes:
         methods: one or both.
-        start: from the initial lattice; or, in a preset, from the design of the study itself.
+        start: from the initial lattice; or, in a preset, from the design of the study itself, or as
+            near to it as this cloak and symmetry allow; or, of several designs, from the previous
+            one, the first from that of the study.
         geometric: the budget with which a design by the angle law of contact is optimised again
             with contact on distance, where its loss depends on the law.
         angle: the budget with which SQP first optimises a design for contact on distance by the
@@ -59,7 +61,7 @@ class Optimiser(Section):
     """
 
     methods: Methods
-    start: Literal["initial", "study"] = "initial"
+    start: Literal["initial", "study", "previous"] = "initial"
     geometric: Method = Method(evaluations=60)
     angle: Method | None = None
     symmetry: Literal["none", "C4", "mirror_x", "mirror_y"] = "none"

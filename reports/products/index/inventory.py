@@ -24,6 +24,7 @@ PRODUCTS = {
     "spectrum": "spectrum",
     "gains": "gains of robust designs",
     "certificate": "losses over a family of loads",
+    "front": "cost of holding against any load",
 }
 """Pages of a study beside its report, by folder."""
 

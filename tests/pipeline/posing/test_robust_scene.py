@@ -107,24 +107,49 @@ def test_a_pulse_is_a_load_of_its_own(fig2: Path) -> None:
     assert largest == pytest.approx(4.5)
 
 
-@pytest.mark.parametrize("void", [None, {"disc": {"centre": ["30 mm", "58 mm"], "radius": "8 mm"}}])
-def test_starts_from_the_study(fig2: Path, tmp_path: Path, void: dict[str, object] | None) -> None:
+OFF_CENTRE = {"disc": {"centre": ["30 mm", "58 mm"], "radius": "8 mm"}}
+
+
+def _starting(fig2: Path, folder: Path, own: dict[str, object], again: dict[str, object]) -> Path:
+    """Writes the study's draft with keys laid over it, and a preset that starts from its design."""
     content = yaml.safe_load(fig2.read_text())
-    presets, again = content["presets"], {"optimiser": {"start": "study"}}
-    presets["quick"] = overlay_keys(presets["quick"], SMALLER)
-    if void is not None:
-        holed = {"void": void, "optimiser": {"symmetry": "none"}}
-        presets["quick"] = overlay_keys(presets["quick"], holed)
-    presets["again"] = overlay_keys(deepcopy(presets["quick"]), again)
-    path = tmp_path / "problem.yaml"
+    presets = content["presets"]
+    presets["quick"] = overlay_keys(overlay_keys(presets["quick"], SMALLER), own)
+    started = overlay_keys({"optimiser": {"start": "study"}}, again)
+    presets["again"] = overlay_keys(deepcopy(presets["quick"]), started)
+    path = folder / "problem.yaml"
     path.write_text(yaml.safe_dump(content))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("own", "again"),
+    [
+        ({}, {}),
+        ({"void": OFF_CENTRE, "optimiser": {"symmetry": "none"}}, {}),
+        ({}, {"optimiser": {"symmetry": "none"}}),
+        ({}, {"optimiser": {"start": "previous"}}),
+    ],
+    ids=["same", "void", "other symmetry", "first of several"],
+)
+def test_starts_from_the_study(
+    fig2: Path, tmp_path: Path, own: dict[str, object], again: dict[str, object]
+) -> None:
+    path = _starting(fig2, tmp_path, own, again)
     words = ["--problem", str(path), "--method", "sqp", "--quiet", "--preset", "again"]
     chosen, out = designed(path, "--preset", "quick"), tmp_path / "again.nc"
     assert run_stage("design", [*words, "--start", str(chosen), "--out", str(out)]) == 0
-    own = tmp_path / "design_sqp.nc"
-    before, after = (datasets.read(name, "design_method") for name in (own, out))
+    first = tmp_path / "design_sqp.nc"
+    before, after = (datasets.read(name, "design_method") for name in (first, out))
     assert float(after["loss"][0]) == pytest.approx(float(before["best_loss"]), rel=1e-6)
     assert json.loads(after.attrs["parents"])["start"]
+
+
+def test_a_start_of_other_units(fig2: Path, tmp_path: Path, failing: Failing) -> None:
+    path = _starting(fig2, tmp_path, {}, {"lattice": {"columns": 7, "rows": 7}})
+    chosen, out = designed(path, "--preset", "quick"), tmp_path / "again.nc"
+    words = ["--problem", str(path), "--preset", "again", "--method", "sqp", "--out", str(out)]
+    assert "another lattice or void" in failing("design", [*words, "--start", str(chosen)])
 
 
 @pytest.mark.parametrize("given", [True, False])

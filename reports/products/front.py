@@ -1,0 +1,148 @@
+"""Draws several designs under own and worst loads: their front, and what limits them."""
+
+import argparse
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipeline import datasets, problem
+from pipeline.problem.sections import split_name, split_value
+from reports.base import Table, prose, style
+from reports.page import FigureText, PageTable, figure_page, publish, titled
+from reports.panels import Panel, PanelFigure
+
+SHARE = "objective.loads.nominal"
+"""The parameter that a front is over."""
+PER_ROW = 3
+"""Panels in a row."""
+_PROSE = prose(__file__)
+_COLUMNS = (
+    "design", "differs by", "value", "drive's own loads", "worst found", "before any design",
+    "worst of random loads", "over their mean", "worst of the certificate's searches",
+)  # fmt: skip
+_NAMES = {"cloak.disc.radius": "radius of the cloak", "constraints.edge_length": "shortest edge"}
+_SIDE, _LEFT, _HEAD, _FOOT = 44.0, 13.0, 8.0, 11.0
+_WORST, _OWN = style.CLOAKED, style.METHOD_COLOURS["mma"]
+
+
+def report(args: argparse.Namespace) -> None:
+    """Makes the report that a command line asks for."""
+    data = datasets.read(args.front, "front")
+    ends = {path.parent.name.partition("@")[2]: path for path in args.certificates}
+    certified = {name: datasets.read(path, "certificate") for name, path in ends.items()}
+    drawn = front_figure(data, certified)
+    title = titled(problem.load(args.problem), args.problem)
+    lead = _PROSE["lead"].format(count=data.sizes["design"])
+    text = FigureText(title, _PROSE["subject"], lead, drawn.caption)
+    shown = PageTable(_COLUMNS, [_row(data.sel(design=name), certified) for name in _designs(data)])
+    made = figure_page("front", text, drawn.draw, drawn.tables, data, shown=shown)
+    publish(made, args.out_dir)
+
+
+def _designs(data: xr.Dataset) -> list[str]:
+    return [str(name) for name in data["design"].values]
+
+
+def _row(point: xr.Dataset, certified: Mapping[str, xr.Dataset]) -> tuple[str, ...]:
+    name = str(point["design"].item())
+    words = (name, str(point["parameter"].item()), str(point["setting"].item()))
+    losses = (f"{float(point[key]):.4g}" for key in ("nominal_loss", "worst_loss", "altered_loss"))
+    if name not in certified:
+        return *words, *losses, "", "", ""
+    of = certified[name].sel(design="cloaked")
+    worst = float(of["loss"].max())
+    over = worst / float(of["loss"].mean())
+    return *words, *losses, f"{worst:.4g}", f"{over:.2f}", f"{float(of['found_loss'].max()):.4g}"
+
+
+def front_figure(data: xr.Dataset, certified: Mapping[str, xr.Dataset]) -> PanelFigure:
+    """Returns the figure: the front, then both losses over every other parameter."""
+    presets = [split_name(name)[0] for name in _designs(data)]
+    series = [data.isel(design=np.array(presets) == name) for name in dict.fromkeys(presets)]
+    series.sort(key=lambda each: _parameter(each) != SHARE)
+    gap = (style.TWO_COLUMNS - PER_ROW * (_LEFT + _SIDE)) / (PER_ROW - 1)
+    columns = {str(name): data[name].values for name in data.variables}
+    table = Table("front.csv", "losses of every design", columns)
+    panels = []
+    for k, each in enumerate(series):
+        left = (k % PER_ROW) * (_LEFT + _SIDE + gap)
+        top = (k // PER_ROW) * (_HEAD + _SIDE + _FOOT)
+        panels.append(_panel("abcdefghijkl"[k], each, certified, left, top, [] if k else [table]))
+    rows = -(-len(series) // PER_ROW)
+    return PanelFigure(rows * (_HEAD + _SIDE + _FOOT), panels)
+
+
+def _parameter(series: xr.Dataset) -> str:
+    return str(series["parameter"].values[0])
+
+
+def _panel(
+    letter: str,
+    series: xr.Dataset,
+    certified: Mapping[str, xr.Dataset],
+    left: float,
+    top: float,
+    tables: list[Table],
+) -> Panel:
+    name = _NAMES.get(_parameter(series), _parameter(series))
+    is_front = _parameter(series) == SHARE
+
+    def draw(figure: Figure) -> None:
+        axes = style.place(figure, left + _LEFT, top + _HEAD, _SIDE, _SIDE)
+        if is_front:
+            _front(axes, series, certified)
+        else:
+            _losses(axes, series, name)
+
+    title = "Own loads against the worst" if is_front else f"Over the {name}"
+    caption = _PROSE["front"] if is_front else _PROSE["series"].format(parameter=f"the {name}")
+    return Panel((letter, title, left, top), draw, caption, tables)
+
+
+def _front(axes: Axes, series: xr.Dataset, certified: Mapping[str, xr.Dataset]) -> None:
+    own, worst = series["nominal_loss"].values, series["worst_loss"].values
+    axes.plot(own, worst, "-o", color=_WORST, ms=3.2, lw=0.8)
+    for name in (name for name in _designs(series) if name in certified):
+        of = certified[name].sel(design="cloaked")
+        most = max(float(of["loss"].max()), float(of["found_loss"].max()))
+        axes.plot(
+            float(series["nominal_loss"].sel(design=name)),
+            most,
+            "s",
+            mfc="none",
+            color=_WORST,
+            ms=5.5,
+            mew=0.8,
+        )
+    for x, y, share in zip(own, worst, series["setting"].values, strict=True):
+        style.note(axes, (x, y), str(share), (4, 1), ha="left", color=style.GREY)
+    unit = _unit(series)
+    axes.set(xlabel=f"loss under own loads{unit}", ylabel=f"worst loss{unit}")
+    axes.margins(0.12)
+
+
+def _unit(series: xr.Dataset) -> str:
+    unit = series["worst_loss"].attrs["units"]
+    return "" if unit == "1" else f" ({unit})"
+
+
+def _losses(axes: Axes, series: xr.Dataset, name: str) -> None:
+    found = [split_value(str(setting)) for setting in series["setting"].values]
+    settings = [str(setting) for setting in series["setting"].values]
+    numbers = all(found)
+    place = np.array([each[0] for each in found if each]) if numbers else np.arange(len(found))
+    for key, line, colour, label in (
+        ("altered_loss", "--", style.ALTERED, "before any design"),
+        ("worst_loss", "-", _WORST, "worst load"),
+        ("nominal_loss", "-", _OWN, "own loads"),
+    ):
+        axes.plot(place, series[key], line, color=colour, marker="o", ms=3.2, lw=1.0, label=label)
+    axes.set_xticks(place, None if numbers else settings)
+    style.log_values(axes)
+    unit = found[0][1] if found[0] else ""
+    axes.set(xlabel=f"{name} ({unit})" if unit else name, ylabel=f"loss{_unit(series)}")
+    axes.legend(loc="best")
+    axes.margins(x=0.08)
