@@ -84,7 +84,11 @@ rule family_report:
     wildcard_constraints:
         # with the preset that asks for several: others of the study ask for one
         name=rule_inputs.any_of(
-            f"{study.name}(?=@{study.preset}/)" if study.preset else f"{study.name}(?=/)"
+            (
+                f"{study.name}(?=@{study.preset}/)"
+                if study.preset
+                else f"{study.name}(?=/)"
+            )
             for study, designs in studies.families().items()
             if designs
         ),
