@@ -157,6 +157,9 @@ def check_scale(drawing: Drawing, laser: Laser) -> Iterator[Fault]:
                 yield drawing.fault(f"the page does not say {words}", key="laser.sheet")
     elif drawing.version != "AC1009" and drawing.units != MILLIMETRES:
         yield drawing.fault(f"$INSUNITS is {drawing.units}, not {MILLIMETRES} (millimetres)")
+    if not drawing.curves:
+        yield drawing.fault("nothing is drawn")
+        return
     points = np.concatenate([curve.points for curve in drawing.curves])
     low, high = points.min(axis=0), points.max(axis=0)
     if np.abs([*low, *(high - laser.sheet)]).max() > TOLERANCE:

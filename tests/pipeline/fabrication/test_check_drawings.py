@@ -59,6 +59,7 @@ def shrunk(place: int, factor: float) -> Damage:
 
 
 DAMAGES: dict[str, tuple[Damage, str]] = {
+    "empty": (lambda kept: kept[:0], "nothing is drawn"),
     "open": (changed(OUTER, closed=False), "part A1: an open curve on layer CUT_OUTER"),
     "bow tie": (reordered(0, 2, 1, 3), "part A1: a cut that crosses or repeats itself"),
     "zero length": (reordered(0, 0, 1, 2, 3), "part A1: a segment of no length"),
