@@ -12,7 +12,7 @@ import numpy as np
 from jax import Array
 
 from benchmarks.scenes import paper_scenes
-from pipeline.posing import limits_of, scene_of
+from pipeline.posing import contact_laws, limits_of, scene_of
 from pipeline.problem.reading import load
 from pipeline.runtime import ROOT
 from sim.constraints import Limits
@@ -118,7 +118,9 @@ def scene(name: str) -> Scene:
     """Poses the scene of that name."""
     if name.startswith("small"):
         return _small_wave() if name == "small_wave" else _small_push()
-    whole = scene_of(load(_file(name)), _file(name).parent).updated(symmetry="none")
+    problem = load(_file(name))
+    law = contact_laws(problem)["angle"]  # the paper's, which all methods have
+    whole = scene_of(problem, _file(name).parent).updated(symmetry="none", contact=law)
     return paper_scenes.one_case(whole, 45.0) if name == "fig2" else whole
 
 

@@ -37,6 +37,7 @@ from .structure_variables import spread as spread
 from .structure_variables import unit_coordinates as unit_coordinates
 from .to_scene import BENT as BENT
 from .to_scene import altered_lattice_of as altered_lattice_of
+from .to_scene import contact_laws as contact_laws
 from .to_scene import lattice_of as lattice_of
 from .to_scene import limits_of as limits_of
 from .to_scene import material_of as material_of

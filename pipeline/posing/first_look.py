@@ -37,7 +37,7 @@ two and a half in the eight studies of a static path."""
 FAMILY = 12
 """Simulations of an evaluation for a family of loads, searches and all (Figure 2)."""
 AVOIDING = 3
-"""Paths that an evaluation costs where snaps are avoided, with its projections (Figure 6's heart)."""
+"""Paths that an evaluation costs where snaps are avoided, with its projections (fig6_heart)."""
 LATER = {True: (28.0, 13.0), False: (4.0, 0.7)}
 """Evaluations that a case of a sweep costs, and a load case of an imperfect copy, static or not:
 measured on Figure 4, and on Figures 2 and 7."""

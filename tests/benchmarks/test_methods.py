@@ -7,7 +7,9 @@ import pytest
 from benchmarks.harness import Method, Run, errors
 from benchmarks.methods import own_solvers, scipy_statics, selection
 from benchmarks.scenes import TITLES
+from benchmarks.scenes.load_cases import scene
 from sim.core import Floats
+from sim.structure import VoidAngleContact
 
 Found = dict[str, Floats]
 
@@ -20,6 +22,11 @@ def reference() -> Found:
 def missed(method: Method, value: float, task: str, reference: Found) -> dict[str, float]:
     run: Run = method.prepare(value, task)
     return errors(run().values, reference)
+
+
+@pytest.mark.parametrize("name", ["fig2", "fig4", "fig5", "fig7"])
+def test_scenes_have_the_law_that_all_methods_have(name: str) -> None:
+    assert isinstance(scene(name).structure.contact, VoidAngleContact)
 
 
 @pytest.mark.parametrize("way", [0, 1])
