@@ -42,11 +42,10 @@ class ClipScript(NamedTuple):
     grid: Mapping[str, Any] = MappingProxyType(GRID)  # the specimen's lattice
 
 
-def _glide(length: float, there: float) -> Callable[[Floats], Floats]:
-    """Moves to a place (mm, along x) and back, in a time each."""
-    return lambda time: np.stack(
-        [length * 0.5 * (1 - np.cos(np.pi * time / there)), 0 * time], axis=-1
-    )
+def _glide(length: float, there: float, angle: float = 0.0) -> Callable[[Floats], Floats]:
+    """Moves to a place (mm, by an angle in deg from x) and back, in a time each."""
+    way = length * np.array([np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))])
+    return lambda time: 0.5 * (1 - np.cos(np.pi * time[:, None] / there)) * way
 
 
 def _hand(image: Singles, time: float) -> None:
@@ -294,6 +293,9 @@ SCRIPTS |= {
     "returns_h264": SCRIPTS["leaves_and_returns"]._replace(film=("libx264", "yuv420p", 20)),
     "returns_fast": ClipScript(
         shift=_glide(140.0, 0.7), times=_LONG, film=("libx264", "yuv420p", 16)
+    ),
+    "returns_by_rows": ClipScript(
+        shift=_glide(148.76, 0.71406, 265.62), times=_LONG, grid={**GRID, "grid": [8, 9]}
     ),
     "off_a_corner": ClipScript(shift=_off_corner, times=_LONG, film=("libx264", "yuv420p", 20)),
 }

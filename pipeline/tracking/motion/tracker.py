@@ -315,7 +315,8 @@ class Tracker:
             if new.sum() > good.sum():
                 return best.fits, new
         self._pose = before
-        return fits, good
+        # where it was last, rows that come in may lie as other rows did
+        return fits, good & (not self._out_of_sight)
 
     def _turned_since(self, place: LatticePlace) -> float:
         """Returns the angle by which a lattice would have turned since the frame before, rad."""
