@@ -23,6 +23,8 @@ from .response_dataset import case_directions as case_directions
 from .response_dataset import loss_units as loss_units
 from .robust_scene import design_scene as design_scene
 from .robust_scene import load_family as load_family
+from .robust_scene import under_worst as under_worst
+from .robust_scene import worst_load as worst_load
 from .start_design import shipped_vector as shipped_vector
 from .start_design import start_vector as start_vector
 from .structure_variables import CLAMPED as CLAMPED

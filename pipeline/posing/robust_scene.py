@@ -3,10 +3,11 @@
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
 from pipeline.posing.to_scene import motions_of, scene_of
 from pipeline.problem import Problem
-from pipeline.problem.sections import HarmonicDrive, Load, RampHarmonicDrive
+from pipeline.problem.sections import DisplacementDrive, HarmonicDrive, Load, RampHarmonicDrive
 from sim.load_family import LoadFamily
 from sim.scene import DIRECTED, Scene
 from sim.solvers import MotionLaw
@@ -59,6 +60,30 @@ def load_family(asked: Problem, folder: Path) -> LoadFamily | None:
         amplitude=ranges.amplitude or (amplitude, amplitude),
         frequency=ranges.frequency or own,
     )
+
+
+def worst_load(certificate: xr.Dataset) -> dict[str, float]:
+    """Finds the load of the greatest loss of a design, of all that a certificate tried.
+
+    Its direction is in degrees, its amplitude in mm, its frequency in Hz, NaN where it has none.
+    """
+    of = certificate.sel(design="cloaked")
+    random, found = (float(of[name].max()) for name in ("loss", "found_loss"))
+    kind, loss = ("load", "loss") if random > found else ("found", "found_loss")
+    number = int(np.nanargmax(of[loss].values))
+    parts = ("direction", "amplitude", "frequency")
+    return {part: float(of[f"{kind}_{part}"].values[number]) for part in parts}
+
+
+def under_worst(asked: Problem, certificate: xr.Dataset) -> Problem:
+    """Poses a problem under the worst load of its certificate alone."""
+    assert isinstance(asked.drive, DisplacementDrive)
+    load = worst_load(certificate)
+    changed: dict[str, object] = {"directions": (float(np.deg2rad(load["direction"])),)}
+    changed |= {"weights": None, "amplitude": load["amplitude"]}
+    if np.isfinite(load["frequency"]):
+        changed["frequency"] = load["frequency"]
+    return asked.model_copy(update={"drive": asked.drive.model_copy(update=changed)})
 
 
 def _under(asked: Problem, load: Load) -> Problem:

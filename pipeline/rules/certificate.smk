@@ -21,10 +21,33 @@ rule certify:
         " --threads {threads} --out {output} --log {log}"
 
 
+rule simulate_worst:
+    input:
+        problem=ancient("experiments/{name}/problem.yaml"),
+        design="results/{name}{preset}/design.nc",
+        certificate="results/{name}{preset}/certificate.nc",
+    output:
+        "results/{name}{preset}/worst_response.nc",
+    log:
+        "results/{name}{preset}/logs/worst_response.log",
+    threads: 1
+    params:
+        study=rule_inputs.options,
+        problem=rule_inputs.section("simulate"),
+        source=source_hash("pipeline.stages.simulate"),
+    message:
+        "Simulating {wildcards.name}{wildcards.preset} under its worst load"
+    shell:
+        "python -m pipeline simulate {params.study} --design {input.design}"
+        " --certificate {input.certificate} --out {output} --log {log}"
+
+
 rule certificate_page:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
+        design="results/{name}{preset}/design.nc",
         certificate="results/{name}{preset}/certificate.nc",
+        response="results/{name}{preset}/worst_response.nc",
     output:
         multiext(
             "results/{name}{preset}/certificate/certificate",
@@ -33,7 +56,11 @@ rule certificate_page:
             ".png",
             ".csv",
         ),
-        "results/{name}{preset}/certificate/searches.csv",
+        expand(
+            "results/{{name}}{{preset}}/certificate/{table}.csv",
+            table=["searches", "worst_load", "facts"],
+        ),
+        facts="results/{name}{preset}/certificate/facts.json",
         page="results/{name}{preset}/certificate/index.html",
     log:
         "results/{name}{preset}/logs/certificate_page.log",
@@ -46,8 +73,8 @@ rule certificate_page:
     message:
         "Drawing the loads tried on {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports certificate {params.study} --certificate {input.certificate}"
-        " --out-dir {params.folder} --log {log}"
+        "python -m reports certificate {params.study} --design {input.design}"
+        " --certificate {input.certificate} --response {input.response} --out-dir {params.folder} --log {log}"
 
 
 rule any_load:

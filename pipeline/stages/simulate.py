@@ -21,6 +21,7 @@ from pipeline.posing import (
     scene_of,
     structures_of,
     times_of,
+    under_worst,
 )
 from pipeline.problem import Problem
 from pipeline.runtime import cli
@@ -39,6 +40,10 @@ def work(args: argparse.Namespace) -> None:
     """
     asked = problem.load(args.problem, args.preset)
     asked = law_comparison.under(asked, "geometric") if args.geometric else asked
+    parents = {"design": args.design}
+    if args.certificate is not None:
+        asked = under_worst(asked, datasets.read(args.certificate, "certificate"))
+        parents["certificate"] = args.certificate
     design = read_design(asked, args.design)
     scene = scene_of(asked, args.problem.parent)
     structures = structures_of(scene, design)
@@ -49,7 +54,7 @@ def work(args: argparse.Namespace) -> None:
         scene = structures[stopped.name].scene
         tried = failures.SimulatedStructure(args.problem, scene, stopped.name, stopped.asked)
         raise failures.simulation_failure(stopped.error, tried, kept) from stopped
-    origin = provenance.of_study(asked, "simulate", parents={"design": args.design}, plan=plans)
+    origin = provenance.of_study(asked, "simulate", parents=parents, plan=plans)
     datasets.write(made, args.out, "response", origin)
 
 

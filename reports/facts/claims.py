@@ -1,6 +1,6 @@
-"""Describes the paper's claims in numbers, judged by the facts of the reports.
+"""Describes claims in numbers, the paper's and our own, judged by the facts of the reports.
 
-reports/facts/claims.yaml lists them; everything but the paper's value is computed here.
+reports/facts/claims.yaml lists the paper's, own_claims.yaml ours; all but the values is computed.
 """
 
 import math
@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.problem.fields import Section, exactly_one
+from pipeline.problem.fields import Section, exactly_one, fault
 from pipeline.problem.reading import load_section
 from pipeline.runtime import UserError
 from reports.facts.fact_records import ABSENT, Fact
@@ -30,9 +30,10 @@ class Claim(Section):
     """Describes one claim; claims.yaml tells what its keys mean."""
 
     study: str
-    line: Annotated[int, Field(gt=0)]
+    line: Annotated[int, Field(gt=0)] | None = None
     paper: str | None = None
     meaning: str | None = None
+    ours: str | None = None
     relation: Relation
     fact: str
     of: Literal["setting", "simulation", "both"]
@@ -40,13 +41,20 @@ class Claim(Section):
 
     @model_validator(mode="after")
     def _one_number(self) -> Self:
-        exactly_one(self, "paper", "meaning")
+        exactly_one(self, "paper", "meaning", "ours")
+        if (self.line is None) is (self.ours is None):
+            raise fault("the paper's claims have a line, ours have none", "correct it", "line")
         return self
+
+    @property
+    def number(self) -> str:
+        """Returns the number as the file has it."""
+        return self.paper or self.meaning or self.ours or ""
 
     @property
     def quoted(self) -> str:
         """Returns the number in words."""
-        return (self.paper or self.meaning or "").replace(" x ", " × ").replace(" deg", "°")
+        return self.number.replace(" x ", " × ").replace(" deg", "°")
 
     @property
     def tolerance(self) -> str:
@@ -94,8 +102,14 @@ class JudgedClaim:
 
 @cache
 def listed() -> Claims:
-    """Returns the claims of the file."""
+    """Returns the paper's claims."""
     return load_section(Path(__file__).with_name("claims.yaml"), Claims)
+
+
+@cache
+def own() -> Claims:
+    """Returns our own claims."""
+    return load_section(Path(__file__).with_name("own_claims.yaml"), Claims)
 
 
 def judged(study: str, facts: Sequence[Fact]) -> list[JudgedClaim]:
@@ -105,7 +119,13 @@ def judged(study: str, facts: Sequence[Fact]) -> list[JudgedClaim]:
         UserError: a fact is in another unit than the claim on it.
     """
     known = {fact.key: fact for fact in facts}
-    return [_judge(claim, known) for claim in listed().claims if claim.study == study]
+    every = (*listed().claims, *own().claims)
+    return [_judge(claim, known) for claim in every if claim.study == study]
+
+
+def quoted(found: Sequence[JudgedClaim]) -> bool:
+    """Tells whether claims are the paper's."""
+    return any(each.claim.ours is None for each in found)
 
 
 def verdict(found: Sequence[JudgedClaim]) -> str:
@@ -142,13 +162,13 @@ def _judge(claim: Claim, known: Mapping[str, Fact]) -> JudgedClaim:
 def _side(claim: Claim, fact: Fact | None, spacing: Fact | None, missing: str) -> Side:
     if fact is None or not math.isfinite(fact.value):
         return Side(ABSENT, "not yet evaluated", missing)
-    value, unit, place = parsed(claim.paper or claim.meaning or "")
+    value, unit, place = parsed(claim.number)
     if unit == "spacings" and spacing is not None:
         value, unit, place = value * spacing.value, spacing.unit, place * spacing.value
     if unit != fact.unit:
         raise UserError(
             f"the fact is in {fact.unit}, the claim in {unit}",
-            file=Path(__file__).with_name("claims.yaml"),
+            file=Path(__file__).with_name("own_claims.yaml" if claim.ours else "claims.yaml"),
             key=claim.fact,
             remedy="give the claim in the unit of the fact",
         )

@@ -42,7 +42,8 @@ class PageText:
 
     `caption` is HTML; `headline` are the facts above all others, `note` is told of the animation;
     `robust` stands below the headline, if there is one; `built` are the words for facts of the
-    headline of the structures as built, by key.
+    headline of the structures as built, by key; `claimed` is what claims are judged of, where that
+    is not the figure.
     """
 
     title: str
@@ -54,6 +55,7 @@ class PageText:
     note: str = ""
     robust: RobustTable | None = None
     built: Mapping[str, str] = field(default_factory=dict)
+    claimed: str = ""
 
 
 def study_text(
@@ -90,14 +92,14 @@ def study_page(
 ) -> Report:
     """Returns the report of studies, of which everything else has been made.
 
-    The paper's claims on the figure of that name are judged. Studies are named as their datasets
-    are called beside others'; a single one needs no name. `together` is what builds all studies and
+    The claims on the figure of that name are judged. Studies are named as their datasets are called
+    beside others'; a single one needs no name. `together` is what builds all studies and
     the problem that asks for them, where one does.
     """
     player, single = payload(animation), "" in studies
     several = list(studies.values())
     draft = list(dict.fromkeys(reason for study in several for reason in study.draft))
-    judged = [] if draft else claims.judged(name, facts)
+    judged = [] if draft else claims.judged(text.claimed or name, facts)
     recordings = studies[""].recordings if single else []
     targets = [together[0]] if together else [study.target for study in several]
     problems = {study.name: study.problem for study in several}
@@ -125,6 +127,7 @@ def study_page(
         "synthetic": LABEL if any(each.synthetic for each in recordings) else "",
         "claims": judged,
         "verdict": claims.verdict(judged),
+        "quoted": claims.quoted(judged),
         "citations": citation.citations(),
     }
     downloads = {table.name: base64.b64encode(table.csv).decode("ascii") for table in tables}
@@ -183,7 +186,7 @@ def sources(study: StudyResults, label: str = "") -> Iterator[Source]:
     }
     before = f"{label}: " if label else ""
     yield _source(f"{before}this page", xr.Dataset(attrs=made))
-    for name, data in study.datasets.items():
+    for name, data in (*study.datasets.items(), *study.others.items()):
         yield _source(f"{before}{name}.nc", data)
 
 

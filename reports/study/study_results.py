@@ -45,7 +45,8 @@ class StudyResults:
     """Holds problem, datasets by kind, where they are from, and why this is but a draft.
 
     `name` is that of the study's folder and of its figure; `files` are hashes of the datasets;
-    `compared` are its recordings beside their simulation, by name.
+    `compared` are its recordings beside their simulation, by name; `others` are datasets that a
+    page shows besides.
     """
 
     name: str
@@ -55,6 +56,7 @@ class StudyResults:
     files: dict[str, str]
     draft: tuple[str, ...] = ()
     compared: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    others: Mapping[str, xr.Dataset] = field(default_factory=dict)
 
     @cached_property
     def recordings(self) -> list[RecordedMotion]:

@@ -10,7 +10,9 @@ from pipeline.__main__ import run_stage
 from pipeline.problem.reading import load, overlay_keys
 from pipeline.stages import certify
 from reports.__main__ import main
+from reports.facts.fact_records import read_json
 from sim.load_family import LoadLosses
+from tests.pipeline import static
 from tests.pipeline.conftest import Failing
 from tests.pipeline.static import designed
 from tests.tables import cases, refused
@@ -51,12 +53,58 @@ def test_a_design_is_certified(fig2: Path, tmp_path: Path, monkeypatch: pytest.M
     assert run_stage("certify", certified) == 0
     assert out.read_bytes() == before
 
-    page = tmp_path / "page"
-    shown = ["certificate", *words, "--certificate", str(out), "--out-dir", str(page)]
-    assert main(shown) == 0
-    assert "this design" in (page / "index.html").read_text(encoding="utf-8")
+
+def certified(
+    problem: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, loads: int = 12
+) -> dict[str, str]:
+    """Certifies the design of a problem and simulates its worst load; options of the page."""
+    monkeypatch.setattr(certify, "LOADS", loads)
+    monkeypatch.setattr(certify, "SEARCHES", 2)
+    words = ["--problem", str(problem), "--quiet"]
+    files = {name: str(folder / f"{name}.nc") for name in ("design", "certificate", "response")}
+    made = [*words, "--design", str(designed(problem))]
+    assert run_stage("certify", [*made, "--out", files["certificate"]]) == 0
+    made += ["--certificate", files["certificate"]]
+    assert run_stage("simulate", [*made, "--out", files["response"]]) == 0
+    return {f"--{name}": file for name, file in files.items()}
+
+
+def page_of(problem: Path, files: dict[str, str], folder: Path) -> str:
+    words = ["--problem", str(problem), "--quiet", "--out-dir", str(folder)]
+    assert main(["certificate", *words, *sum(files.items(), ())]) == 0
+    return (folder / "index.html").read_text(encoding="utf-8")
+
+
+def test_the_page_shows_the_worst_load(
+    fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, page = write(fig2, tmp_path), tmp_path / "page"
+    files = certified(path, tmp_path, monkeypatch)
+    text = page_of(path, files, page)
+    data = datasets.read(Path(files["--certificate"]), "certificate").squeeze("design")
+    response = datasets.read(Path(files["--response"]), "response").isel(case=0)
+    found = max(float(data["loss"].max()), float(data["found_loss"].max()))
+    relative = (3.0 / float(response["amplitude"])) ** 2 * response["loss"].sel(structure="cloaked")
+    assert float(relative) == pytest.approx(found, rel=0.02)  # other steps
+
+    assert "this design" in text
+    assert 'id="player-data"' in text
     table = pd.read_csv(page / "certificate.csv", comment="#")
     np.testing.assert_allclose(table["loss (1)"], data["loss"], rtol=1e-6)
+    facts = {fact.key: fact for fact in read_json(page / "facts.json")}
+    assert facts["worst_found"].value == pytest.approx(found)
+    altered = float(response["loss"].sel(structure="altered"))
+    reduction = 1 - float(response["loss"].sel(structure="cloaked")) / altered
+    assert facts["reduction"].value == pytest.approx(100 * reduction)
+
+
+def test_the_page_of_a_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ranges = "target: intact, loads: { directions: [170 deg, 190 deg] }"
+    more = static.HOLE.replace("target: intact", ranges)
+    path = static.write(tmp_path, more, size=5, amplitude=3.0)
+    text = page_of(path, certified(path, tmp_path, monkeypatch), tmp_path / "page")
+    assert "motion of the intact lattice" in text
+    assert 'id="player-data"' in text
 
 
 def test_only_loads_in_ranges_are_certified(fig2: Path, tmp_path: Path, failing: Failing) -> None:

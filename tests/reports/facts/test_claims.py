@@ -1,8 +1,11 @@
 from dataclasses import replace
 
 import pytest
+import yaml
+from pydantic import ValidationError
 
-from pipeline.runtime import UserError
+from pipeline.runtime import ROOT, UserError
+from pipeline.workflow import studies
 from reports.facts import Fact, claims, number
 from reports.figures.loading_path import facts as along
 from reports.figures.shielding import facts as shielding
@@ -21,6 +24,25 @@ def test_claims_are_in_words_of_their_own_with_a_line_and_a_unit() -> None:
         assert value >= 0
         assert unit in UNIT
         assert place <= 1
+
+
+def test_our_own_claims_are_on_targets_and_facts_that_there_are() -> None:
+    known = yaml.safe_load((ROOT / "reports/products/certificate/facts.yaml").read_text())
+    for claim in claims.own().claims:
+        assert claim.study in studies.targets()
+        assert claim.fact in known
+        assert claims.parsed(claim.number)[0] > 0
+    open_ones = claims.judged("fig2@unbiased", [])
+    assert {each.simulation.status for each in open_ones} == {"not yet evaluated"}
+    assert not claims.quoted(open_ones)
+    assert claims.quoted(claims.judged("fig2", []))
+
+
+def test_a_claim_is_the_papers_with_its_line_or_our_own() -> None:
+    words = {"study": "fig2", "relation": "is", "fact": "units", "of": "setting", "says": "units"}
+    for given in ({"paper": "15 mm"}, {"ours": "15 mm", "line": 3}, {"ours": "1", "paper": "1"}):
+        with pytest.raises(ValidationError):
+            claims.Claim.model_validate(words | given)
 
 
 @pytest.mark.parametrize("name", ["fig2", "fig4", "fig5"])

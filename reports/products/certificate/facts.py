@@ -1,0 +1,56 @@
+"""States numbers of a certificate: losses over the family, under own loads and under the worst."""
+
+from collections.abc import Iterator
+
+import xarray as xr
+
+from pipeline.posing import worst_load
+from reports.facts import Fact, facts_of, grouped, measures
+from reports.products.certificate.figure import CertifiedDesign
+
+NEAR = 0.95
+"""Of the greatest loss that a search ended at: those above it found the same worst."""
+_told = facts_of(__file__)
+
+
+def certificate_facts(found: CertifiedDesign) -> list[Fact]:
+    """Returns all facts: of the family, of the worst load, and of the study's own design."""
+    facts = [
+        *grouped("Any load", _family(found.own)),
+        *grouped("The worst load", _worst(found)),
+        *grouped("The drive's own loads", _own(found.own)),
+    ]
+    if "study" in found.data["design"]:
+        facts += grouped("The study's own design", _study(found.data.sel(design="study")))
+    return facts
+
+
+def _family(of: xr.Dataset) -> Iterator[Fact]:
+    losses = of["loss"]
+    mean, worst = float(losses.mean()), float(losses.max())
+    yield _told("loads", of.sizes["load"])
+    yield _told("mean", mean)
+    yield _told("share_95", float(losses.quantile(0.95)))
+    yield _told("worst_random", worst)
+    yield _told("worst_over_mean", worst / mean)
+
+
+def _worst(found: CertifiedDesign) -> Iterator[Fact]:
+    worst, ends = worst_load(found.data), found.own["found_loss"]
+    words = [f"{worst['direction']:.3g}°", f"{worst['amplitude']:.3g} mm"]
+    words += [f"{worst['frequency']:.3g} Hz"] if found.harmonic else []
+    yield _told("searches", ends.size)
+    yield _told("worst_found", found.most, load=", ".join(words))
+    yield _told("near", int((ends > NEAR * ends.max()).sum()))
+    reduction = measures.reduction(found.worst.response["loss"].isel(case=0))
+    yield _told("reduction", reduction)
+
+
+def _own(of: xr.Dataset) -> Iterator[Fact]:
+    yield _told("nominal", float(of["nominal_loss"]))
+    yield _told("nominal_worst", float(of["nominal_worst"]))
+
+
+def _study(of: xr.Dataset) -> Iterator[Fact]:
+    yield _told("study_worst", max(float(of["loss"].max()), float(of["found_loss"].max())))
+    yield _told("study_nominal", float(of["nominal_loss"]))

@@ -1,0 +1,269 @@
+"""Composes the figure of a certificate: losses over the family, motion under the worst load."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
+
+from pipeline.posing import worst_load
+from reports.base import Table, prose, style
+from reports.panels import (
+    CLAMP_TINT,
+    CLOAK_TINT,
+    Panel,
+    PanelFigure,
+    arrow,
+    colour_bar,
+    draw,
+    draw_clamps,
+    drive_arrows,
+    outline,
+    tints,
+)
+from reports.study import CLAMPED, CLOAK, DRIVEN, RigidUnits, StudyResults, from_dataset
+from sim.core import Floats
+
+_PROSE = prose(__file__)
+_COLOURS = {"cloaked": style.CLOAKED, "study": style.GREY}
+_NAMES = {"cloaked": "this design", "study": "the study's own"}
+_AXES = {"frequency": "frequency (Hz)", "amplitude": "amplitude (mm)", "direction": "direction (°)"}
+_UNIT_TINT = "#c3c7cc"
+_TOP, _LOW, _HIGH, _HEIGHT = 11.0, 70.0, 36.0, 119.0
+
+
+@dataclass(frozen=True)
+class CertifiedDesign:
+    """Holds a certificate, and the study under the worst load of it."""
+
+    data: xr.Dataset
+    worst: StudyResults
+
+    @property
+    def harmonic(self) -> bool:
+        """Tells whether the loads have a frequency."""
+        return bool(self.data["load_frequency"].notnull().all())
+
+    @property
+    def own(self) -> xr.Dataset:
+        """Returns the losses of the design itself."""
+        return self.data.sel(design="cloaked")
+
+    @property
+    def most(self) -> float:
+        """Returns the greatest loss of the design, of all that was tried."""
+        return max(float(self.own["loss"].max()), float(self.own["found_loss"].max()))
+
+    @property
+    def axes(self) -> tuple[str, str]:
+        """Names the axis of the map beside the amplitude, and that of the scatter."""
+        return ("frequency", "direction") if self.harmonic else ("direction", "amplitude")
+
+    @cached_property
+    def size(self) -> xr.DataArray:
+        """Returns |U| (structure, time, unit) under the worst load."""
+        spacing = self.worst.problem.lattice.spacing
+        moved = self.worst.response["displacement"].isel(case=0)
+        return _magnitude(moved, spacing)
+
+    @cached_property
+    def missed(self) -> xr.DataArray:
+        """Returns the root mean square (structure, time) of what is missed in the region."""
+        response, problem = self.worst.response, self.worst.problem
+        moved = response["displacement"].isel(case=0)
+        if problem.objective.target == "intact":
+            moved = moved - moved.sel(structure="intact")
+        size = _magnitude(moved, problem.lattice.spacing)
+        inside = size.isel(unit=response["roi"].values.astype(bool))
+        found: xr.DataArray = (inside**2).mean("unit") ** 0.5
+        return found
+
+
+def _magnitude(moved: xr.DataArray, spacing: float) -> xr.DataArray:
+    scale = xr.DataArray([spacing, spacing, 1.0], dims="dof", coords={"dof": moved["dof"]})
+    squares: xr.DataArray = (moved / scale) ** 2
+    return squares.sum("dof", skipna=False) ** 0.5
+
+
+def certificate_figure(found: CertifiedDesign) -> PanelFigure:
+    """Returns the whole figure."""
+    data = found.data
+    missed_words = _PROSE["missed"][found.worst.problem.objective.target]
+    words = {"loads": data.sizes["load"], "along": found.axes[1], "missed": missed_words}
+
+    def losses(figure: Figure) -> None:
+        _distribution(style.place(figure, 72.0, _TOP, 41.0, _HIGH), data)
+
+    def loads(figure: Figure) -> None:
+        _map(figure, style.place(figure, 129.0, _TOP, 33.0, _HIGH), found)
+
+    def along(figure: Figure) -> None:
+        _scatter(style.place(figure, 12.0, _LOW, 41.0, _HIGH), found)
+
+    def missed(figure: Figure) -> None:
+        _missed(style.place(figure, 139.0, _LOW, 37.0, _HIGH), found)
+
+    motion = Table("worst_load.csv", "motion under the worst load (panel f)", _series(found))
+    heads = {
+        "a": ("Design", 0.0, 0.8, lambda figure: _design(figure, found), []),
+        "b": ("Loss under random loads", 62.0, 0.8, losses, _tables(data)),
+        "c": ("Loss, load by load", 119.0, 0.8, loads, []),
+        "d": (f"Loss over {found.axes[1]}", 0.0, _LOW - 10.0, along, []),
+        "e": ("Peak under the worst load", 62.0, _LOW - 10.0, lambda f: _peaks(f, found), []),
+        "f": ("Under the worst load", 129.0, _LOW - 10.0, missed, [motion]),
+    }
+    panels = [
+        Panel((letter, title, left, top), drawn, _PROSE[letter].format(**words), tables)
+        for letter, (title, left, top, drawn, tables) in heads.items()
+    ]
+    return PanelFigure(_HEIGHT, panels)
+
+
+def _tables(data: xr.Dataset) -> list[Table]:
+    def columns(name: str, loss: str) -> dict[str, np.ndarray]:
+        """Loads of one kind, a row for each design and load."""
+        parts = [f"{name}_direction", f"{name}_amplitude", f"{name}_frequency", loss]
+        rows = data[["design", *parts]].to_dataframe().reset_index()
+        return {"design": rows["design"].to_numpy()} | {
+            f"{part} ({data[part].attrs.get('units', '1')})": rows[part].to_numpy()
+            for part in parts
+        }
+
+    return [
+        Table("certificate.csv", "losses under random loads (b to d)", columns("load", "loss")),
+        Table("searches.csv", "loads that searches ended at", columns("found", "found_loss")),
+    ]
+
+
+def _series(found: CertifiedDesign) -> dict[str, Floats]:
+    columns = {"time_s": found.missed["time"].values}
+    for name in _structures(found):
+        columns[f"missed_{name}"] = found.missed.sel(structure=name).values
+    return columns
+
+
+def _structures(found: CertifiedDesign) -> list[str]:
+    return [name for name in ("altered", "cloaked") if name in found.missed["structure"]]
+
+
+def _label(data: xr.Dataset) -> str:
+    unit = data["loss"].attrs.get("units", "1")
+    return "loss" if unit == "1" else f"loss ({unit})"
+
+
+def _design(figure: Figure, found: CertifiedDesign) -> None:
+    axes = style.place(figure, 2.0, 7.0, 44.0, 44.0)
+    problem, design = found.worst.problem, found.worst.design
+    structure = from_dataset(design, problem.lattice.spacing)
+    draw_clamps(axes, structure, problem.lattice.spacing)
+    held = {CLAMPED: CLAMP_TINT, DRIVEN: style.ALTERED}
+    draw(axes, structure, colours=tints(structure, held, {CLOAK: CLOAK_TINT}, _UNIT_TINT))
+    _circle(axes, found)
+    worst = worst_load(found.data)
+    driven = structure.centroid[structure.support == DRIVEN].mean(axis=0)
+    reach = 0.75 * problem.lattice.spacing, 2.2 * problem.lattice.spacing
+    if found.harmonic:
+        drive_arrows(axes, driven, worst["direction"], reach, style.ALTERED)
+    else:
+        angle = np.radians(worst["direction"])
+        start, end = (driven + size * np.array([np.cos(angle), np.sin(angle)]) for size in reach)
+        arrow(axes, start, end, style.ALTERED, 7.0)
+    words = [f"{worst['direction']:.0f}°", f"{worst['amplitude']:.3g} mm"]
+    words += [f"{worst['frequency']:.3g} Hz"] if found.harmonic else []
+    told = f"worst load: {', '.join(words)}"
+    style.write(figure, 24.0, 51.0, told, ha="center", fontsize=style.SMALL)
+
+
+def _circle(axes: Axes, found: CertifiedDesign) -> None:
+    problem = found.worst.problem
+    if problem.cloak.bounds is not None and not isinstance(problem.cloak.bounds[0], tuple):
+        radii = [radius for radius in problem.cloak.bounds[1:] if radius > 0]
+        outline(axes, np.array(problem.lattice.centre_site), radii, style.CLOAKED)
+
+
+def _distribution(axes: Axes, data: xr.Dataset) -> None:
+    for name in data["design"].values[::-1]:
+        of, colour = data.sel(design=name), _COLOURS[str(name)]
+        ordered = np.sort(of["loss"].values[~np.isnan(of["loss"].values)])
+        share = 100 * (1 - np.arange(1, len(ordered) + 1) / len(ordered))
+        axes.plot(ordered, share, color=colour, label=_NAMES[str(name)])
+        axes.plot(
+            of["found_loss"], np.full(data.sizes["search"], 103.0 if name == "cloaked" else 107.0),
+            "|", color=colour, markersize=4.0, clip_on=False,
+        )  # fmt: skip
+        axes.plot(of["nominal_worst"], 0.0, "v", color=colour, markersize=4.0, clip_on=False)
+    axes.set(xlabel=_label(data), ylabel="share of the loads above (%)", ylim=(0.0, 100.0))
+    axes.set_xlim(left=0.0)
+    axes.legend(loc="upper right")
+
+
+def _map(figure: Figure, axes: Axes, found: CertifiedDesign) -> None:
+    own, across = found.own, found.axes[0]
+    order = np.argsort(own["loss"].values)
+    norm = Normalize(0.0, found.most)
+    axes.scatter(
+        own[f"load_{across}"][order], own["load_amplitude"][order], c=own["loss"][order],
+        cmap=style.MAGNITUDE, norm=norm, s=5.0, linewidths=0.0,
+    )  # fmt: skip
+    axes.scatter(
+        own[f"found_{across}"], own["found_amplitude"], s=14.0, facecolors="none",
+        edgecolors=style.CLOAKED, linewidths=0.7, clip_on=False, zorder=5,
+    )  # fmt: skip
+    if across == "frequency":
+        axes.set_xscale("log")
+        low, high = np.round(np.log2(axes.get_xlim())).astype(int)
+        axes.set_xticks(octaves := 2.0 ** np.arange(low, high + 1), [f"{f:g}" for f in octaves])
+        axes.minorticks_off()
+    axes.set(xlabel=_AXES[across], ylabel=_AXES["amplitude"])
+    colour_bar(figure, norm, style.MAGNITUDE, (164.5, _TOP, _HIGH), _label(found.data))
+
+
+def _scatter(axes: Axes, found: CertifiedDesign) -> None:
+    along = found.axes[1]
+    for name in found.data["design"].values[::-1]:
+        of, colour = found.data.sel(design=name), _COLOURS[str(name)]
+        axes.plot(
+            of[f"load_{along}"], of["loss"], ".", color=colour, markersize=2.0, markeredgewidth=0.0,
+            label=_NAMES[str(name)],
+        )  # fmt: skip
+    axes.set(xlabel=_AXES[along], ylabel=_label(found.data))
+    axes.set_ylim(bottom=0.0)
+    if along == "direction":
+        axes.xaxis.set_major_locator(MultipleLocator(45.0))
+
+
+def _peaks(figure: Figure, found: CertifiedDesign) -> None:
+    peak = found.size.max("time")
+    response, spacing = found.worst.response, found.worst.problem.lattice.spacing
+    free = response["support"].values != DRIVEN
+    norm = Normalize(0.0, float(peak.isel(unit=free & response["roi"].values.astype(bool)).max()))
+    for k, name in enumerate(_structures(found)):
+        axes = style.place(figure, 62.0 + 26.5 * k, _LOW + 2.0, 26.0, 26.0)
+        structure: RigidUnits = from_dataset(response.sel(structure=name), spacing)
+        draw_clamps(axes, structure, spacing)
+        values = peak.sel(structure=name).values
+        draw(axes, structure, values=values, colour_map=style.MAGNITUDE, norm=norm)
+        if name == "cloaked":
+            _circle(axes, found)
+        colour = style.STRUCTURE_COLOURS[name]
+        axes.set_title(name.capitalize(), color=colour, fontsize=style.TEXT, pad=1.5)
+    bar = (115.5, _LOW + 2.0, 26.0)
+    colour_bar(figure, norm, style.MAGNITUDE, bar, r"$U_\mathrm{peak}$", extend="max")
+
+
+def _missed(axes: Axes, found: CertifiedDesign) -> None:
+    missed = found.missed
+    for name in _structures(found):
+        colour = style.STRUCTURE_COLOURS[name]
+        values = missed.sel(structure=name)
+        axes.plot(missed["time"], values, color=colour, label=name.capitalize(), lw=1.0)
+    mimics = found.worst.problem.objective.target == "intact"
+    missed_words = r"\mathbf{U}-\mathbf{U}^*" if mimics else r"\mathbf{U}"
+    axes.set(xlabel="$t$ (s)", ylabel=f"rms of $\\|{missed_words}\\|$")
+    axes.set_xlim(0.0, float(missed["time"][-1]))
+    axes.set_ylim(bottom=0.0)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, columnspacing=0.8)
