@@ -1,4 +1,4 @@
-"""Repeats motions with shorter and shorter steps, and with contact on the distance of units."""
+"""Repeats motions with shorter and shorter steps, and with the other law of contact."""
 
 from __future__ import annotations
 
@@ -32,7 +32,11 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 
 HALVINGS = {AS_RUN: 0, "half the step": 1, "a quarter of the step": 2}
-BY_DISTANCE = "contact on distance"
+OTHER_LAW = {
+    "angle": ("geometric", "contact on distance"),
+    "geometric": ("angle", "contact on void angles"),
+}
+"""By the law of a study: the one that it is compared with, and the name of that check."""
 
 Runs = dict[str, Response]
 
@@ -54,14 +58,15 @@ def trials(
         runs = {name: run.refined() for name, run in runs.items()}
         found[check] = _numbers(structures, runs, as_run, times)
         status[check] = "ok"
-    others = structures_of(scene_of(law_comparison.under(asked, "geometric"), folder), design)
+    law, check = OTHER_LAW[asked.contact.law]
+    others = structures_of(scene_of(law_comparison.under(asked, law), folder), design)
     try:
         runs = {name: _first(each, times) for name, each in others.items()}
-        found[BY_DISTANCE] = _numbers(others, runs, as_run, times)
-        status[BY_DISTANCE] = "ok"
+        found[check] = _numbers(others, runs, as_run, times)
+        status[check] = "ok"
     except SimulationError as error:
-        LOG.warning("%s: %s", BY_DISTANCE, error)
-        status[BY_DISTANCE] = str(error)
+        LOG.warning("%s: %s", check, error)
+        status[check] = str(error)
     return found, status
 
 

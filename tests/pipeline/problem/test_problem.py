@@ -29,7 +29,8 @@ from tests.pipeline.conftest import Refusal
 from tests.tables import cases, refused
 
 ROBUST = (
-    "broadband", "worst", "amplitudes", "tolerant", "pulse", "unbiased", "unbiased_as_built",
+    "broadband", "worst", "amplitudes", "tolerant", "pulse", "unbiased", "unbiased_share",
+    "unbiased_size", "unbiased_edge", "unbiased_as_built",
 )  # fmt: skip
 NAMES = ("edge3", "free", "text", *ROBUST, "as_built", "robust", "quick")
 PRESETS = (None, *NAMES)
