@@ -13,6 +13,7 @@ from pipeline.problem.sections import split_name, split_value
 from reports.base import Table, prose, style
 from reports.page import FigureText, PageTable, figure_page, publish, titled
 from reports.panels import Panel, PanelFigure
+from sim.core import Floats
 
 SHARE = "objective.loads.nominal"
 """The parameter that a front is over."""
@@ -25,6 +26,8 @@ _COLUMNS = (
 )  # fmt: skip
 _NAMES = {"cloak.disc.radius": "radius of the cloak", "constraints.edge_length": "shortest edge"}
 _SIDE, _LEFT, _HEAD, _FOOT = 44.0, 13.0, 8.0, 11.0
+_APART = 0.12
+"""Share of a front's extent that points are apart which have a label."""
 _WORST, _OWN = style.CLOAKED, style.METHOD_COLOURS["mma"]
 
 
@@ -95,7 +98,7 @@ def _panel(
         if is_front:
             _front(axes, series, certified)
         else:
-            _losses(axes, series, name)
+            _losses(axes, series, name, legend=letter in "ab")
 
     title = "Own loads against the worst" if is_front else f"Over the {name}"
     caption = _PROSE["front"] if is_front else _PROSE["series"].format(parameter=f"the {name}")
@@ -117,8 +120,14 @@ def _front(axes: Axes, series: xr.Dataset, certified: Mapping[str, xr.Dataset]) 
             ms=5.5,
             mew=0.8,
         )
-    for x, y, share in zip(own, worst, series["setting"].values, strict=True):
-        style.note(axes, (x, y), str(share), (4, 1), ha="left", color=style.GREY)
+    places = np.stack([own, worst], axis=-1)
+    size = np.ptp(places, axis=0) + np.finfo(float).tiny
+    labelled: list[Floats] = []
+    for k in (0, len(places) - 1, *range(1, len(places) - 1)):  # the ends in any case
+        if all(np.abs((places[k] - other) / size).max() > _APART for other in labelled):
+            share = str(series["setting"].values[k])
+            style.note(axes, tuple(places[k]), share, (4, 1), ha="left", color=style.GREY)
+            labelled.append(places[k])
     unit = _unit(series)
     axes.set(xlabel=f"loss under own loads{unit}", ylabel=f"worst loss{unit}")
     axes.margins(0.12)
@@ -129,7 +138,7 @@ def _unit(series: xr.Dataset) -> str:
     return "" if unit == "1" else f" ({unit})"
 
 
-def _losses(axes: Axes, series: xr.Dataset, name: str) -> None:
+def _losses(axes: Axes, series: xr.Dataset, name: str, *, legend: bool) -> None:
     found = [split_value(str(setting)) for setting in series["setting"].values]
     settings = [str(setting) for setting in series["setting"].values]
     numbers = all(found)
@@ -140,9 +149,10 @@ def _losses(axes: Axes, series: xr.Dataset, name: str) -> None:
         ("nominal_loss", "-", _OWN, "own loads"),
     ):
         axes.plot(place, series[key], line, color=colour, marker="o", ms=3.2, lw=1.0, label=label)
-    axes.set_xticks(place, None if numbers else settings)
+    axes.set_xticks(place, [f"{at:g}" for at in place] if numbers else settings)
     style.log_values(axes)
     unit = found[0][1] if found[0] else ""
     axes.set(xlabel=f"{name} ({unit})" if unit else name, ylabel=f"loss{_unit(series)}")
-    axes.legend(loc="best")
+    if legend:
+        axes.legend(loc="center right", bbox_to_anchor=(1.0, 0.7))
     axes.margins(x=0.08)
