@@ -105,7 +105,7 @@ def certificate_figure(found: CertifiedDesign) -> PanelFigure:
         _scatter(style.place(figure, 12.0, _LOW, 41.0, _HIGH), found)
 
     def missed(figure: Figure) -> None:
-        _missed(style.place(figure, 139.0, _LOW, 37.0, _HIGH), found)
+        _missed(style.place(figure, 139.0, _LOW, 35.5, _HIGH), found)
 
     motion = Table("worst_load.csv", "motion under the worst load (panel f)", _series(found))
     heads = {

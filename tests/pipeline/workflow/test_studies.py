@@ -32,7 +32,7 @@ def test_names_of_their_own_are_left_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "preset", ["fabrication", "sweep", "gains", "spectrum", "recordings", "2_fabrication"]
+    "preset", ["fabrication", "sweep", "gains", "front", "recordings", "2_fabrication"]
 )
 def test_a_preset_called_like_a_product(preset: str, tmp_path: Path) -> None:
     study(tmp_path, "mine", preset)
