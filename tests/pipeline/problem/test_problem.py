@@ -28,11 +28,12 @@ from pipeline.runtime import ROOT, STAGES
 from tests.pipeline.conftest import Refusal
 from tests.tables import cases, refused
 
-ROBUST = (
-    "broadband", "worst", "amplitudes", "tolerant", "pulse", "unbiased", "unbiased_share",
-    "unbiased_size", "unbiased_edge", "unbiased_as_built",
+ROBUST = ("broadband", "worst", "amplitudes", "tolerant", "pulse")
+UNBIASED = (
+    "unbiased", "unbiased_share", "unbiased_size", "unbiased_edge", "unbiased_free", "fastest",
+    "unbiased_as_built",
 )  # fmt: skip
-NAMES = ("edge3", "free", "text", *ROBUST, "as_built", "robust", "quick")
+NAMES = ("edge3", "free", "text", *ROBUST, *UNBIASED, "as_built", "robust", "quick")
 PRESETS = (None, *NAMES)
 
 
