@@ -39,7 +39,8 @@ def work(args: argparse.Namespace) -> None:
     family = loads_in_ranges(asked, args.problem)
     paths = {"cloaked": args.design} | ({} if args.other is None else {"study": args.other})
     words = (problem.section_hash(asked, "certify"), source_hash("pipeline.stages.certify"))
-    with losses_journal(args.out, "certify", (*words, *file_hashes(paths))) as journal:
+    hashes = map(provenance.file_hash, paths.values())
+    with losses_journal(args.out, "certify", (*words, *hashes)) as journal:
         made = certificate(asked, family, args.problem.parent, paths, journal, args.threads)
     origin = provenance.of_study(asked, "certify", parents=paths)
     datasets.write(made, args.out, "certificate", origin)
@@ -65,11 +66,6 @@ def losses_journal(out: Path, stage: str, words: Iterable[str]) -> Journal:
     folder = out.parent / ".journal" / f"{stage}_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
     folder.mkdir(parents=True, exist_ok=True)
     return Journal(folder / "losses.journal", key)
-
-
-def file_hashes(paths: Mapping[str, Path]) -> list[str]:
-    """Hashes the files of designs, in their order."""
-    return [provenance.file_hash(path) for path in paths.values()]
 
 
 def own_places(scene: Scene, family: LoadFamily) -> Floats:

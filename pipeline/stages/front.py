@@ -15,7 +15,6 @@ from pipeline.problem.sections import split_name
 from pipeline.runtime import UserError, cli, source_hash
 from pipeline.stages.certify import (
     TriedDesign,
-    file_hashes,
     loads_in_ranges,
     losses_journal,
     own_places,
@@ -53,22 +52,24 @@ def work(args: argparse.Namespace) -> None:
         what = "no preset asks for several designs under loads in ranges"
         remedy = "add one with objective.loads and designs, such as unbiased_share of Figure 2"
         raise UserError(what, file=args.problem, key="presets", remedy=remedy)
-    hashes = [problem.section_hash(problem.load(args.problem, name), "front") for name in given]
-    words = (source_hash("pipeline.stages.front"), *hashes, *file_hashes(given))
-    with losses_journal(args.out, "front", words) as journal:
-        made = front(args.problem, given, journal, args.threads)
+    made = front(args.problem, given, args.out, args.threads)
     origin = provenance.of_study(problem.load(args.problem), "front", parents=given)
     datasets.write(made, args.out, "front", origin)
 
 
-def front(path: Path, designs: Mapping[str, Path], journal: Journal, threads: int) -> xr.Dataset:
-    """The dataset ``front`` of designs by name, such as ``unbiased_edge.2``."""
+def front(path: Path, designs: Mapping[str, Path], out: Path, threads: int) -> xr.Dataset:
+    """The dataset ``front`` of designs by name, such as ``unbiased_edge.2``.
+
+    Each has a journal beside the file ``out``, so that another design leaves theirs as they are.
+    """
     each = SPREAD + SEARCHES + len(case_directions(problem.load(path))) + 1
+    rows = []
     with cli.progress(len(designs) * each, "loads") as bar:
-        rows = [
-            _point(path, name, design, journal, threads, bar.update)
-            for name, design in designs.items()
-        ]
+        for name, design in designs.items():
+            section = problem.section_hash(problem.load(path, name), "front")
+            words = (source_hash("pipeline.stages.front"), section, provenance.file_hash(design))
+            with losses_journal(out, "front", words) as journal:
+                rows.append(_point(path, name, design, journal, threads, bar.update))
     columns = {
         name: (("design",), list(column))
         for name, column in zip(FrontPoint._fields, zip(*rows, strict=True), strict=True)

@@ -24,7 +24,11 @@ _COLUMNS = (
     "design", "differs by", "value", "drive's own loads", "worst found", "before any design",
     "worst of random loads", "over their mean", "worst of the certificate's searches",
 )  # fmt: skip
-_NAMES = {"cloak.disc.radius": "radius of the cloak", "constraints.edge_length": "shortest edge"}
+_NAMES = {
+    "cloak.disc.radius": "radius of the cloak",
+    "constraints.edge_length": "shortest edge",
+    "constraints.block_angle": "sharpest corner",
+}
 _SIDE, _LEFT, _HEAD, _FOOT = 44.0, 13.0, 8.0, 11.0
 _APART = 0.12
 """Share of a front's extent that points are apart which have a label."""

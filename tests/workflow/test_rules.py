@@ -33,7 +33,7 @@ def test_studies_from_nothing(sandbox: Sandbox) -> None:
     assert "report" not in planned
     front = sandbox.planned("fig2_front")
     counts = {"front": 1, "front_page": 1, "fig2_front": 1, "certify": 2}
-    assert front == {"design": 20, "select": 19, **counts}
+    assert front == {"design": 23, "select": 22, **counts}
     assert sandbox.planned("fig2@unbiased_size")["family_report"] == 1
     alone = sandbox.planned("fig3@quick.2")
     assert alone["design"] == alone["report"] == 1

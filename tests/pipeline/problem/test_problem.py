@@ -30,8 +30,8 @@ from tests.tables import cases, refused
 
 ROBUST = ("broadband", "worst", "amplitudes", "tolerant", "pulse")
 UNBIASED = (
-    "unbiased", "unbiased_share", "unbiased_size", "unbiased_edge", "unbiased_free", "fastest",
-    "unbiased_as_built",
+    "unbiased", "unbiased_share", "unbiased_size", "unbiased_edge", "unbiased_angle",
+    "unbiased_free", "fastest", "unbiased_as_built",
 )  # fmt: skip
 NAMES = ("edge3", "free", "text", *ROBUST, *UNBIASED, "as_built", "robust", "quick")
 PRESETS = (None, *NAMES)
