@@ -81,21 +81,20 @@ def lens_variance(camera: Camera, alike: list[Camera], centre: Floats, motion: R
     """
     out = np.full(motion.shape, np.nan)
     known = np.isfinite(motion[..., 0])
-    rest = np.broadcast_to(centre, (*motion.shape[:2], 2))[known]
-    if not len(rest):
+    unit = np.nonzero(known)[1]
+    if not len(unit):
         return out
-    now = rest + motion[known][:, :2]
-    both = np.concatenate([now, rest])
+    now = centre[unit] + motion[known][:, :2]
+    both = np.concatenate([now, centre])
     low, high = both.min(axis=0), both.max(axis=0)
-    axes = np.linspace(low, high, _NODES)
-    nodes = np.stack(np.meshgrid(*axes.T, indexing="ij"), axis=-1)
+    nodes = np.stack(np.meshgrid(*np.linspace(low, high, _NODES).T, indexing="ij"), axis=-1)
     cells = np.maximum(high - low, 1e-9) / (_NODES - 1)
-    here, there = ((place - low).T / cells[:, None] for place in (now, rest))
-    total = np.zeros((len(rest), 3))
+    here, there = ((place - low).T / cells[:, None] for place in (now, centre))
+    total = np.zeros((len(unit), 3))
     for other in alike:
         for dof, field in enumerate(_errors(camera, other, nodes)):
-            change = map_coordinates(field, here, order=1) - map_coordinates(field, there, order=1)
-            total[:, dof] += change**2
+            rest = map_coordinates(field, there, order=1)[unit]
+            total[:, dof] += (map_coordinates(field, here, order=1) - rest) ** 2
     out[known] = total
     return out
 
