@@ -18,7 +18,7 @@ from sim.core import Floats
 SHARE = "objective.loads.nominal"
 """The parameter that a front is over."""
 PER_ROW = 3
-"""Panels in a row."""
+"""Panels in a row, at most; four stand two by two."""
 _PROSE = prose(__file__)
 _COLUMNS = (
     "design", "differs by", "value", "drive's own loads", "worst found", "before any design",
@@ -29,7 +29,7 @@ _NAMES = {
     "constraints.edge_length": "shortest edge",
     "constraints.block_angle": "sharpest corner",
 }
-_SIDE, _LEFT, _HEAD, _FOOT = 44.0, 13.0, 8.0, 11.0
+_HIGH, _LEFT, _HEAD, _ROW, _GAP = 44.0, 13.0, 8.0, 63.0, 4.0
 _APART = 0.12
 """Share of a front's extent that points are apart which have a label."""
 _WORST, _OWN = style.CLOAKED, style.METHOD_COLOURS["mma"]
@@ -70,16 +70,15 @@ def front_figure(data: xr.Dataset, certified: Mapping[str, xr.Dataset]) -> Panel
     presets = [split_name(name)[0] for name in _designs(data)]
     series = [data.isel(design=np.array(presets) == name) for name in dict.fromkeys(presets)]
     series.sort(key=lambda each: _parameter(each) != SHARE)
-    gap = (style.TWO_COLUMNS - PER_ROW * (_LEFT + _SIDE)) / (PER_ROW - 1)
+    count = 2 if len(series) == PER_ROW + 1 else PER_ROW
+    each_wide = (style.TWO_COLUMNS + _GAP) / count
     columns = {str(name): data[name].values for name in data.variables}
     table = Table("front.csv", "losses of every design", columns)
     panels = []
     for k, each in enumerate(series):
-        left = (k % PER_ROW) * (_LEFT + _SIDE + gap)
-        top = (k // PER_ROW) * (_HEAD + _SIDE + _FOOT)
-        panels.append(_panel("abcdefghijkl"[k], each, certified, left, top, [] if k else [table]))
-    rows = -(-len(series) // PER_ROW)
-    return PanelFigure(rows * (_HEAD + _SIDE + _FOOT), panels)
+        place = (k % count) * each_wide, (k // count) * _ROW, each_wide - _GAP
+        panels.append(_panel("abcdefghijkl"[k], each, certified, place, [] if k else [table]))
+    return PanelFigure(-(-len(series) // count) * _ROW, panels)
 
 
 def _parameter(series: xr.Dataset) -> str:
@@ -90,15 +89,16 @@ def _panel(
     letter: str,
     series: xr.Dataset,
     certified: Mapping[str, xr.Dataset],
-    left: float,
-    top: float,
+    place: tuple[float, float, float],
     tables: list[Table],
 ) -> Panel:
+    """Describes one panel at a place: mm from left and top, and its width."""
+    left, top, wide = place
     name = _NAMES.get(_parameter(series), _parameter(series))
     is_front = _parameter(series) == SHARE
 
     def draw(figure: Figure) -> None:
-        axes = style.place(figure, left + _LEFT, top + _HEAD, _SIDE, _SIDE)
+        axes = style.place(figure, left + _LEFT, top + _HEAD, wide - _LEFT, _HIGH)
         if is_front:
             _front(axes, series, certified)
         else:
@@ -155,7 +155,7 @@ def _losses(axes: Axes, series: xr.Dataset, name: str, *, legend: bool) -> None:
         axes.plot(place, series[key], line, color=colour, marker="o", ms=3.2, lw=1.0, label=label)
     axes.set_xticks(place, [f"{at:g}" for at in place] if numbers else settings)
     style.log_values(axes)
-    unit = found[0][1] if found[0] else ""
+    unit = found[0][1].replace("deg", "°") if found[0] else ""
     axes.set(xlabel=f"{name} ({unit})" if unit else name, ylabel=f"loss{_unit(series)}")
     if legend:
         axes.legend(loc="center right", bbox_to_anchor=(1.0, 0.7))
