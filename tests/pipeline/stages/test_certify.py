@@ -10,6 +10,7 @@ from pipeline.__main__ import run_stage
 from pipeline.problem.reading import load, overlay_keys
 from pipeline.stages import certify
 from reports.__main__ import main
+from reports.facts import claims
 from reports.facts.fact_records import read_json
 from sim.load_family import LoadLosses
 from tests.pipeline import static
@@ -79,8 +80,14 @@ def test_the_page_shows_the_worst_load(
     fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, page = write(fig2, tmp_path), tmp_path / "page"
+    claim = {"study": tmp_path.name, "ours": "10", "relation": "below", "fact": "worst_found"}
+    claim |= {"of": "simulation", "says": "loss under any load"}
+    ours = claims.Claims.model_validate({"source": "this test", "claims": [claim]})
+    monkeypatch.setattr(claims, "own", lambda: ours)
     files = certified(path, tmp_path, monkeypatch)
     text = page_of(path, files, page)
+    assert "Our claims" in text
+    assert "Claims that hold: 1 of 1 in simulation" in text
     data = datasets.read(Path(files["--certificate"]), "certificate").squeeze("design")
     response = datasets.read(Path(files["--response"]), "response").isel(case=0)
     found = max(float(data["loss"].max()), float(data["found_loss"].max()))
