@@ -1,5 +1,6 @@
 """Poses the scene that a design is optimised for, and the loads that it must hold."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,11 +8,23 @@ import xarray as xr
 
 from pipeline.posing.to_scene import motions_of, scene_of
 from pipeline.problem import Problem
-from pipeline.problem.sections import DisplacementDrive, HarmonicDrive, Load, RampHarmonicDrive
-from sim.load_family import LoadFamily
+from pipeline.problem.sections import (
+    DisplacementDrive,
+    Drive,
+    HarmonicDrive,
+    Load,
+    LoadRanges,
+    RampHarmonicDrive,
+    SeveralDrives,
+    TestSetup,
+)
+from sim.load_family import LoadFamily, LoadSetup, polar
 from sim.scene import DIRECTED, Scene
-from sim.solvers import MotionLaw
+from sim.solvers import MotionLaw, Together
 from sim.structure import Perturbation, draw_copies
+
+_ALIKE = ("amplitude", "frequency")
+"""Ranges that all set-ups have alike, where they give none of their own."""
 
 
 def design_scene(asked: Problem, folder: Path) -> Scene:
@@ -50,14 +63,24 @@ def load_family(asked: Problem, folder: Path) -> LoadFamily | None:
     ranges = asked.objective.loads
     if ranges is None:
         return None
-    motions = [motion for motion in motions_of(asked, folder) if isinstance(motion, DIRECTED)]
-    directions = [float(motion.direction) for motion in motions]
-    amplitude = float(motions[0].amplitude)
+    setups = [_setup(asked, ranges, folder)]
+    for each in ranges.setups:
+        given = {name: getattr(each, name) or getattr(ranges, name) for name in _ALIKE}
+        posed = asked.in_setup(each)
+        made = _setup(posed, each.model_copy(update=given), folder)
+        setups.append(replace(made, scene=scene_of(posed, folder)))
+    return LoadFamily(tuple(setups))
+
+
+def _setup(asked: Problem, ranges: LoadRanges | TestSetup, folder: Path) -> LoadSetup:
+    """Reads the loads in ranges under a problem's own drive, or two at once."""
+    motions = [m for m in motions_of(asked, folder) if isinstance(m, DIRECTED | Together)]
+    directions, amplitudes = zip(*map(polar, motions), strict=True)
     own = None if asked.frequency is None else (asked.frequency, asked.frequency)
-    return LoadFamily(
+    return LoadSetup(
         motions[0],
         direction=ranges.directions or (min(directions), max(directions)),
-        amplitude=ranges.amplitude or (amplitude, amplitude),
+        amplitude=ranges.amplitude or (amplitudes[0], amplitudes[0]),
         frequency=ranges.frequency or own,
     )
 
@@ -65,25 +88,38 @@ def load_family(asked: Problem, folder: Path) -> LoadFamily | None:
 def worst_load(certificate: xr.Dataset) -> dict[str, float]:
     """Finds the load of the greatest loss of a design, of all that a certificate tried.
 
-    Its direction is in degrees, its amplitude in mm, its frequency in Hz, NaN where it has none.
+    Its direction is in degrees, its amplitude in mm, its frequency in Hz, NaN where it has none;
+    its set-up is numbered, the study's own is the first.
     """
     of = certificate.sel(design="cloaked")
     random, found = (float(of[name].max()) for name in ("loss", "found_loss"))
     kind, loss = ("load", "loss") if random > found else ("found", "found_loss")
     number = int(np.nanargmax(of[loss].values))
-    parts = ("direction", "amplitude", "frequency")
+    parts = ("direction", "amplitude", "frequency", "setup")
     return {part: float(of[f"{kind}_{part}"].values[number]) for part in parts}
 
 
 def under_worst(asked: Problem, certificate: xr.Dataset) -> Problem:
     """Poses a problem under the worst load of its certificate alone."""
-    assert isinstance(asked.drive, DisplacementDrive)
-    load = worst_load(certificate)
-    changed: dict[str, object] = {"directions": (float(np.deg2rad(load["direction"])),)}
-    changed |= {"weights": None, "amplitude": load["amplitude"]}
+    load, ranges = worst_load(certificate), asked.objective.loads
+    if (number := int(load["setup"])) and ranges is not None:
+        asked = asked.in_setup(ranges.setups[number - 1])
+    return asked.model_copy(update={"drive": _along(asked.drive, load)})
+
+
+def _along(drive: Drive, load: dict[str, float]) -> Drive:
+    """Turns a drive along a load, or mixes two by it."""
+    way, amplitude = float(np.deg2rad(load["direction"])), load["amplitude"]
+    if isinstance(drive, SeveralDrives):
+        parts = amplitude * np.cos(way), amplitude * np.sin(way)
+        mixed = zip(drive.drives, map(float, parts), strict=True)
+        drives = tuple(one.model_copy(update={"amplitude": part}) for one, part in mixed)
+        return drive.model_copy(update={"drives": drives})
+    assert isinstance(drive, DisplacementDrive)
+    changed: dict[str, object] = {"directions": (way,), "weights": None, "amplitude": amplitude}
     if np.isfinite(load["frequency"]):
         changed["frequency"] = load["frequency"]
-    return asked.model_copy(update={"drive": asked.drive.model_copy(update=changed)})
+    return drive.model_copy(update=changed)
 
 
 def _under(asked: Problem, load: Load) -> Problem:

@@ -190,14 +190,14 @@ def control_of(problem: Problem) -> NDArray[np.int64] | None:
     None where they displace all degrees of freedom.
     """
     driven = problems.driven_units(problem)
-    control = np.full((len(driven), 3), DISPLACEMENT)
+    control = np.full((len(driven), 3), FREE)
     for drive in single_drives(problem.drive):
         rows = np.isin(driven, selected_units(drive.units, problem.lattice))
         for dof, name in enumerate(DOFS):
-            if name in drive.free:
-                control[rows, dof] = FREE
-            elif isinstance(drive, ForceDrive | TorqueDrive) and name in drive.acting:
+            if isinstance(drive, ForceDrive | TorqueDrive) and name in drive.acting:
                 control[rows, dof] = FORCE
+            elif name not in drive.free:
+                control[rows, dof] = DISPLACEMENT
     return None if (control == DISPLACEMENT).all() else control
 
 

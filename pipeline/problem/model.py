@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -17,7 +16,6 @@ from pipeline.problem.fields import (
     Samples,
     Section,
     exactly_one,
-    fault,
 )
 from pipeline.problem.sections import (
     STIFFNESSES,
@@ -35,32 +33,18 @@ from pipeline.problem.sections import (
     Region,
     ReportOptions,
     Robustness,
-    Selector,
     Spectrum,
+    Support,
     Sweep,
     TanhRampDrive,
+    TestSetup,
     Tolerances,
     VoidRegion,
+    read_several,
     single_drives,
 )
 
 _STATIC_INFILL = 0.15
-
-
-class Support(Section):
-    """Units with some of their degrees of freedom held at zero.
-
-    Attributes:
-        units: by side, or listed.
-        clamp: the degrees of freedom.
-    """
-
-    units: Selector
-    clamp: Annotated[tuple[Literal["ux", "uy", "theta"], ...], Field(min_length=1)] = (
-        "ux",
-        "uy",
-        "theta",
-    )
 
 
 class Inclusion(Section):
@@ -230,17 +214,7 @@ class Problem(Section):
     @model_validator(mode="before")
     @classmethod
     def _several_drives(cls, data: object) -> object:
-        if not isinstance(data, Mapping):
-            return data
-        if isinstance(data.get("drive"), list):
-            remedy = "write them below it, or several drives in a list under `drives`"
-            raise fault("keys and values are wanted here", remedy, "drive")
-        if "drives" not in data:
-            return data
-        if "drive" in data:
-            raise fault("drive and drives exclude each other", "give one of them", "drives")
-        others = {key: value for key, value in data.items() if key != "drives"}
-        return {**others, "drive": {"kind": "several", "drives": data["drives"]}}
+        return read_several(data)
 
     @property
     def infill(self) -> float:
@@ -262,6 +236,10 @@ class Problem(Section):
     def with_optimiser(self, **values: object) -> Problem:
         """Returns the problem with other values of these keys of its optimiser."""
         return self.model_copy(update={"optimiser": self.optimiser.model_copy(update=values)})
+
+    def in_setup(self, setup: TestSetup) -> Problem:
+        """Returns the problem with the supports and drives of another set-up."""
+        return self.model_copy(update={"supports": setup.supports, "drive": setup.drive})
 
     def asks_more_than(self, own: Problem) -> bool:
         """Tells a preset of the study `own` that is to hold against more or other loads."""

@@ -14,10 +14,11 @@ from pipeline.datasets import provenance
 from pipeline.posing import load_family, loss_units, read_design, scene_of, structures_of
 from pipeline.problem import Problem
 from pipeline.runtime import UserError, cli, source_hash
-from sim.core import Floats, SimulationError
+from sim.core import Floats, Ints, SimulationError
 from sim.load_family import LoadFamily, LoadLosses, ascend
 from sim.optimise import Journal
 from sim.scene import DIRECTED, Scene, concrete_parameters
+from sim.solvers import Together
 
 LOADS, SEARCHES = 1000, 50
 """Random loads, and searches of the worst one from random starts."""
@@ -70,7 +71,7 @@ def losses_journal(out: Path, stage: str, words: Iterable[str]) -> Journal:
 
 def own_places(scene: Scene, family: LoadFamily) -> Floats:
     """Finds the places (n_cases, n) of the drive's own loads in a family."""
-    motions = [each for each in scene.loads.motions if isinstance(each, DIRECTED)]
+    motions = [each for each in scene.loads.motions if isinstance(each, DIRECTED | Together)]
     return np.array([family.place(motion) for motion in motions])
 
 
@@ -113,14 +114,15 @@ def certificate(
 
 def _numbers(
     name: str, dims: tuple[str, ...], family: LoadFamily, places: Floats
-) -> dict[str, tuple[tuple[str, ...], Floats]]:
-    """Tells directions in degrees, amplitudes and frequencies of places (..., n)."""
-    numbers = np.asarray(family.numbers(places))
+) -> dict[str, tuple[tuple[str, ...], Floats | Ints]]:
+    """Tells directions in degrees, amplitudes, frequencies and set-ups of places (..., n)."""
+    numbers = family.numbers(places)
     unknown = np.full(numbers.shape[:-1], np.nan)
     return {
         f"{name}_direction": (dims, np.rad2deg(numbers[..., 0])),
         f"{name}_amplitude": (dims, numbers[..., 1]),
-        f"{name}_frequency": (dims, unknown if family.size == 2 else numbers[..., 2]),
+        f"{name}_frequency": (dims, unknown if numbers.shape[-1] == 2 else numbers[..., 2]),
+        f"{name}_setup": (dims, family.number(places)),
     }
 
 

@@ -15,7 +15,8 @@ def schema() -> dict[str, Any]:
     """Builds the schema of a problem file, presets included."""
     whole = _without_working_units(Problem.model_json_schema(mode="validation"))
     sections = whole.pop("$defs")
-    _offer_drives(whole, sections)
+    for section in (whole, sections["TestSetup"]):
+        _offer_drives(section, sections)
     overlay = _overlaid({key: value for key, value in whole.items() if key != "title"})
     overlays = {name + _OVERLAY: _overlaid(section) for name, section in sections.items()}
     whole["properties"]["presets"] = {

@@ -21,7 +21,7 @@ from sim.load_family.worst_load import APART, FoundLoad, SearchOptions, search_w
 from sim.optimise import Evaluate, Evaluation, Journal, Result, SqpOptions
 from sim.optimise import minimise as minimise_loss
 from sim.scene import DIRECTED, Scene, combined, constraints_of, make_plan, parameters_of_design
-from sim.solvers import MotionLaw
+from sim.solvers import MotionLaw, Together
 
 LOG = logging.getLogger(__name__)
 
@@ -124,8 +124,8 @@ class LoadSet:
                 self._idle = np.append(self._idle, 0)
 
 
-def _directed(motion: MotionLaw) -> DIRECTED:
-    assert isinstance(motion, DIRECTED)
+def _directed(motion: MotionLaw) -> DIRECTED | Together:
+    assert isinstance(motion, DIRECTED | Together)
     return motion
 
 
@@ -202,9 +202,12 @@ def minimise_worst(
 
 def without_copies(family: LoadFamily, scene: Scene) -> LoadFamily:
     """Leaves out directions whose loads are turned copies of others, by a design's symmetry."""
-    low, high = family.direction
+    first = family.setups[0]
+    low, high = first.direction
     quarter = low + np.pi / 2
-    turned = scene.driven_by(*(family.motion._replace(direction=a) for a in (low, quarter)))
-    if high <= quarter or len(make_plan(turned).simulated) == 2:
+    if len(family.setups) > 1 or high <= quarter or isinstance(first.motion, Together):
         return family
-    return replace(family, direction=(low, quarter))
+    turned = scene.driven_by(*(first.motion._replace(direction=a) for a in (low, quarter)))
+    if len(make_plan(turned).simulated) == 2:
+        return family
+    return LoadFamily((replace(first, direction=(low, quarter)),))

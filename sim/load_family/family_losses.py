@@ -8,7 +8,7 @@ derivative by the frequency is then one by masses and dampings, exact for the st
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import jax
@@ -16,32 +16,38 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.core import Floats, Numbers
+from sim.core import Floats, Ints, Numbers
 from sim.scene import DIRECTED, Scene, concrete_parameters, make_plan, mimicking
-from sim.solvers import Harmonic, PrescribedMotion, Solver, differentiable_motion
+from sim.solvers import Harmonic, MotionLaw, Solver, Together, differentiable_motion
 from sim.structure import Parameters
 
 Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class LoadFamily:
-    """Spans loads along directions, with amplitudes and frequencies in some ranges.
+class LoadSetup:
+    """Spans loads of one set-up of supports and drives, in ranges.
 
     A load is a place in the unit cube: its direction and amplitude grow linearly along the axes,
-    its frequency by its logarithm. The loss of the motion's amplitude counts as it is, that of
-    another one with the square of the ratio of the two.
+    its frequency by its logarithm. Of two motions at once the direction is that of their
+    amplitudes: A cos of the first, A sin of the second.
     """
 
-    motion: DIRECTED  # the drive's
+    motion: DIRECTED | Together  # the drive's
     direction: Range  # rad
     amplitude: Range  # mm
     frequency: Range | None = None  # Hz; None for a motion that has none
+    scene: Scene | None = None  # whose loads these are; None for the one that is designed
 
     @property
     def size(self) -> int:
         """Counts the numbers of a load: direction, amplitude, and the frequency if it has one."""
         return 2 if self.frequency is None else 3
+
+    @property
+    def own_amplitude(self) -> float:
+        """Amplitude of the drive's motion, mm."""
+        return float(polar(self.motion)[1])
 
     def numbers(self, place: Numbers) -> Array:
         """Direction (rad), amplitude (mm) and frequency (Hz) at places (..., n)."""
@@ -55,9 +61,9 @@ class LoadFamily:
             found.append(low * (high / low) ** at[..., 2])
         return jnp.stack(found, axis=-1)
 
-    def place(self, motion: DIRECTED) -> Floats:
+    def place(self, motion: DIRECTED | Together) -> Floats:
         """Finds the place (n,) of a motion, in the unit cube or not."""
-        along = [(motion.direction, self.direction), (motion.amplitude, self.amplitude)]
+        along = list(zip(polar(motion), (self.direction, self.amplitude), strict=True))
         if self.frequency is not None:
             assert isinstance(motion, Harmonic)
             low, high = self.frequency
@@ -74,12 +80,12 @@ class LoadFamily:
         below = np.log2(self.frequency[1] / float(self.numbers(place)[2]))
         return int(np.floor(below + 1e-9))
 
-    def fastest(self, octave: int) -> DIRECTED:
+    def fastest(self, octave: int) -> DIRECTED | Together:
         """Returns the largest motion with the highest frequency of an octave.
 
         What else has a duration keeps its number of periods.
         """
-        largest = self.motion._replace(amplitude=self.amplitude[1])
+        largest = directed(self.motion, polar(self.motion)[0], self.amplitude[1])
         if self.frequency is None:
             return largest
         assert isinstance(largest, Harmonic)
@@ -87,6 +93,81 @@ class LoadFamily:
         shorter = float(largest.frequency) / top
         rise = None if largest.rise is None else largest.rise * shorter
         return largest._replace(frequency=top, rise=rise, delay=largest.delay * shorter)
+
+    def posed(self, scene: Scene) -> Scene:
+        """Puts a scene, and its reference, under the supports and drives of the set-up."""
+        if self.scene is None:
+            return scene
+        made, other = replace(scene, loads=self.scene.loads), self.scene.objective.reference
+        if scene.objective.reference is None or other is None:
+            return made
+        return made.updated(reference=replace(scene.objective.reference, loads=other.loads))
+
+
+@dataclass(frozen=True)
+class LoadFamily:
+    """Spans loads of one or several set-ups, alike in kind.
+
+    Of several set-ups the last axis of the unit cube is cut into as many equal parts.
+    """
+
+    setups: tuple[LoadSetup, ...]  # the first that of the scene that is designed
+
+    @property
+    def size(self) -> int:
+        """Counts the numbers of a load."""
+        return self.setups[0].size + (len(self.setups) > 1)
+
+    def number(self, places: Floats) -> Ints:
+        """Numbers (...,) of the set-ups of places (..., n)."""
+        count = len(self.setups)
+        if count == 1:
+            return np.zeros(places.shape[:-1], dtype=np.int64)
+        return np.clip(places[..., -1] * count, 0, count - 1).astype(np.int64)
+
+    def setup(self, place: Floats) -> LoadSetup:
+        """Returns the set-up of a place (n,)."""
+        return self.setups[int(self.number(place))]
+
+    def numbers(self, places: Floats) -> Floats:
+        """Direction (rad), amplitude (mm) and frequency (Hz) at places (..., n)."""
+        each = np.stack([np.asarray(one.numbers(places)) for one in self.setups])
+        return np.take_along_axis(each, self.number(places)[None, ..., None], axis=0)[0]
+
+    def place(self, motion: DIRECTED | Together) -> Floats:
+        """Finds the place (n,) of a motion of the first set-up, in the unit cube or not."""
+        return self.centred(np.append(self.setups[0].place(motion), [0.0] * (len(self.setups) > 1)))
+
+    def centred(self, places: Floats) -> Floats:
+        """Moves places (..., n) to the middle of their set-up's part, so that equal loads are."""
+        if len(self.setups) == 1:
+            return places
+        middle = (self.number(places) + 0.5) / len(self.setups)
+        return np.concatenate([places[..., :-1], middle[..., None]], axis=-1)
+
+
+def directed(
+    motion: DIRECTED | Together, direction: float | Array, amplitude: float | Array
+) -> DIRECTED | Together:
+    """Turns a motion along a direction (rad) with an amplitude (mm), or mixes two so."""
+    if not isinstance(motion, Together):
+        return motion._replace(direction=direction, amplitude=amplitude)
+    parts = (amplitude * jnp.cos(direction), amplitude * jnp.sin(direction))
+    mixed = zip(motion.motions, parts, strict=True)
+    return motion._replace(motions=tuple(_one(one)._replace(amplitude=part) for one, part in mixed))
+
+
+def polar(motion: DIRECTED | Together) -> tuple[float, float]:
+    """Direction, rad, and amplitude, mm, of a motion or a mixture of two."""
+    if not isinstance(motion, Together):
+        return float(motion.direction), float(motion.amplitude)
+    first, second = (float(_one(one).amplitude) for one in motion.motions)
+    return float(np.arctan2(second, first)), float(np.hypot(first, second))
+
+
+def _one(motion: MotionLaw) -> DIRECTED:
+    assert isinstance(motion, DIRECTED)
+    return motion
 
 
 class LoadLoss(NamedTuple):
@@ -110,7 +191,7 @@ class LoadLosses:
         self, scene: Scene, family: LoadFamily, of_design: Callable[[Array], Parameters[Any]]
     ) -> None:
         self._scene, self.family, self._of_design = scene, family, of_design
-        self._octaves: dict[int, _Octave] = {}
+        self._octaves: dict[tuple[int, int], _Octave] = {}
 
     def __call__(self, design: Floats, place: Floats) -> LoadLoss:
         """Computes the loss of a design (n_variables,) under the load at a place, with derivatives.
@@ -131,10 +212,12 @@ class LoadLosses:
         return float(self._octave(place).loss(jnp.asarray(design), jnp.asarray(place)))
 
     def _octave(self, place: Floats) -> _Octave:
-        number = self.family.octave(place)
-        if number not in self._octaves:
-            self._octaves[number] = _Octave(self._scene, self.family, number, self._of_design)
-        return self._octaves[number]
+        setup = self.family.setup(place)
+        key = int(self.family.number(place)), setup.octave(place)
+        if key not in self._octaves:
+            own = self.family.setups[0].own_amplitude
+            self._octaves[key] = _Octave(self._scene, setup, key[1], own, self._of_design)
+        return self._octaves[key]
 
 
 class _Posed(NamedTuple):
@@ -143,10 +226,10 @@ class _Posed(NamedTuple):
     scene: Scene
     solver: Solver
 
-    def displacement(self, values: Parameters[Any], motion: DIRECTED, ratio: Array) -> Array:
+    def displacement(self, values: Parameters[Any], motion: MotionLaw, ratio: Array) -> Array:
         """Displacement (1, n_times, n_units, 3), in time scaled by the ratio of frequencies."""
         scaled = values._replace(mass=ratio**2 * values.mass, damping=ratio * values.damping)
-        drive = PrescribedMotion(self.scene.loads.driven, motion)
+        drive = self.scene.loads.following(motion)
         return differentiable_motion(self.solver, scaled, (drive,), designed=True).displacement
 
 
@@ -156,15 +239,17 @@ class _Octave:
     def __init__(
         self,
         scene: Scene,
-        family: LoadFamily,
+        setup: LoadSetup,
         number: int,
+        own_amplitude: float,
         of_design: Callable[[Array], Parameters[Any]],
     ) -> None:
-        fastest, duration, top = family.fastest(number), scene.loads.duration, None
+        scene = setup.posed(scene)
+        fastest, duration, top = setup.fastest(number), scene.loads.duration, None
         if isinstance(fastest, Harmonic):
-            assert isinstance(family.motion, Harmonic)
+            assert isinstance(setup.motion, Harmonic)
             top = float(fastest.frequency)
-            duration *= float(family.motion.frequency) / top
+            duration *= float(setup.motion.frequency) / top
         # explicit steps would have to be stable for the lowest frequency of the octave
         posed = scene.under((fastest,), duration, top, integrator="implicit")
         self._posed = _Posed(posed, make_plan(posed, every_case=True).solver)
@@ -175,27 +260,27 @@ class _Octave:
             values = concrete_parameters(intact, intact.lattice.vertices)
             self._intact = _Posed(intact, plan.solver), values
 
-        def load(place: Array) -> tuple[DIRECTED, Array]:
-            direction, amplitude, *frequency = family.numbers(place)
+        def load(place: Array) -> tuple[MotionLaw, Array, Array]:
+            direction, amplitude, *frequency = setup.numbers(place)
             ratio = frequency[0] / top if frequency else jnp.ones(())
-            return fastest._replace(direction=direction, amplitude=amplitude), ratio
+            return directed(fastest, direction, amplitude), amplitude, ratio
 
         def relative(
             moved: Array, values: Parameters[Array], target: Array | None, amplitude: Array
         ) -> Array:
             loss = mimicking(posed, target)(moved, values)[0]
             # the error of a motion to mimic is relative to it already
-            return loss if target is not None else loss * (family.motion.amplitude / amplitude) ** 2
+            return loss if target is not None else loss * (own_amplitude / amplitude) ** 2
 
         self._load, self._relative = jax.jit(load), jax.jit(relative)
 
     def loss(self, design: Array, place: Array) -> Array:
         """Computes the loss of a design under the load at a place; differentiable by both."""
-        motion, ratio = self._load(place)
+        motion, amplitude, ratio = self._load(place)
         values = self._of_design(design)
         moved, target = self._posed.displacement(values, motion, ratio), None
         if self._intact is not None:
             intact, constants = self._intact
             region = intact.scene.objective.region
             target = intact.displacement(constants, motion, ratio)[:, :, region]
-        return self._relative(moved, values, target, motion.amplitude)
+        return self._relative(moved, values, target, amplitude)

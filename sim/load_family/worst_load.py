@@ -39,7 +39,7 @@ def spread_places(family: LoadFamily, count: int, seed: int) -> Floats:
     from scipy.stats import qmc
 
     power = int(np.ceil(np.log2(max(count, 1))))
-    return qmc.Sobol(family.size, rng=seed).random_base2(power)[:count]
+    return family.centred(qmc.Sobol(family.size, rng=seed).random_base2(power)[:count])
 
 
 def ascend(

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pipeline.problem import Problem, cloak_units, inclusion_units, interest_units, void_units
 from pipeline.problem.reading.yaml_file import KeyPath
@@ -10,12 +10,15 @@ from pipeline.problem.sections import (
     DisplacementDrive,
     LinearRampDrive,
     ListedNetwork,
+    LoadRanges,
     Quads,
     Region,
     Regular,
     Selector,
     SeveralDrives,
     SingleDrive,
+    TanhRampDrive,
+    TestSetup,
     loose_units,
     resolve_centre,
     selected_units,
@@ -117,17 +120,27 @@ def _units_exist(problem: Problem) -> Findings:
 
 
 def _drive_is_free(problem: Problem) -> Findings:
-    others: set[int] = set()
+    others: list[tuple[set[int], SingleDrive]] = []
     for keys, drive in _drives(problem):
         driven = set(selected_units(drive.units, problem.lattice))
         for support in problem.supports:
-            if both := sorted(driven & set(selected_units(support.units, problem.lattice))):
+            both = sorted(driven & set(selected_units(support.units, problem.lattice)))
+            if both and not set(drive.acting).isdisjoint(support.clamp):
                 what = f"unit {problem.lattice.name(both[0])} is driven and clamped"
                 yield ProblemFault(what, (*keys, "units"), "drive or clamp it, not both")
-        if both := sorted(driven & others):
-            what = f"unit {problem.lattice.name(both[0])} is driven twice"
-            yield ProblemFault(what, (*keys, "units"), "give every unit to one drive")
-        others |= driven
+        for units, other in others:
+            if (both := sorted(driven & units)) and (dof := _contested(drive, other)):
+                what = f"unit {problem.lattice.name(both[0])} is driven twice, along {dof}"
+                remedy = "give every unit to one drive, or let the others' way be `free`"
+                yield ProblemFault(what, (*keys, "units"), remedy)
+        others.append((driven, drive))
+
+
+def _contested(one: SingleDrive, other: SingleDrive) -> str | None:
+    """Names a degree of freedom that one of two drives moves and the other does not leave free."""
+    held = [{"ux", "uy", "theta"} - set(drive.free) for drive in (one, other)]
+    moved = [set(drive.acting) for drive in (one, other)]
+    return min(held[0] & moved[1] | held[1] & moved[0], default=None)
 
 
 def _one_kind_of_load(problem: Problem) -> Findings:
@@ -186,20 +199,19 @@ def _reaction(problem: Problem) -> Findings:
 
 def _loads(problem: Problem) -> Findings:
     """Finds what a family of loads cannot be of, or cannot be minimised over."""
-    objective, drive = problem.objective, problem.drive
+    objective = problem.objective
     if (family := objective.loads) is None:
         return
     place = ("objective", "loads")
-    if not isinstance(drive, DisplacementDrive):
-        what = f"a drive of the kind {drive.kind} has no displacement and direction to vary"
-        yield ProblemFault(what, place, "leave it out, or displace units along a direction")
-        return
-    if family.frequency is not None and problem.frequency is None:
-        what = f"a {drive.kind} drive has no frequency to vary"
-        yield ProblemFault(what, (*place, "frequency"), "leave it out")
-    elif family.frequency is not None and problem.horizon.periods is None:
-        what = "a time does not fit loads of all frequencies"
-        yield ProblemFault(what, ("horizon", "duration"), "give `periods`")
+    yield from _ranges(problem, family, place)
+    for index, setup in enumerate(family.setups):
+        posed, keys = problem.in_setup(setup), (*place, "setups", index)
+        for check in (_units_exist, _drive_is_free, _one_kind_of_load, _horizon):
+            yield from (replace(found, keys=(*keys, *found.keys)) for found in check(posed))
+        yield from _ranges(posed, setup, keys)
+        if (posed.static, posed.frequency is None) != (problem.static, problem.frequency is None):
+            what = f"a {setup.drive.kind} drive is of another kind than the study's"
+            yield ProblemFault(what, (*keys, "drive"), f"give one like a {problem.drive.kind}")
     if objective.robust is not None:
         what = "loads in ranges take the place of some"
         yield ProblemFault(what, ("objective", "robust"), "leave out one of the two")
@@ -209,6 +221,26 @@ def _loads(problem: Problem) -> Findings:
     if problem.optimiser.methods.mma is not None:
         what = "the worst of many loads is minimised by sqp alone"
         yield ProblemFault(what, ("optimiser", "methods", "mma"), "leave it out (a preset: null)")
+
+
+def _ranges(problem: Problem, ranges: LoadRanges | TestSetup, place: KeyPath) -> Findings:
+    """Finds ranges that the drive of a set-up does not have."""
+    drive = problem.drive
+    if isinstance(drive, SeveralDrives):
+        parts = drive.drives
+        ramps = all(isinstance(part, LinearRampDrive | TanhRampDrive) for part in parts)
+        if len(parts) != 2 or not ramps or len(drive.case_weights) > 1:
+            what = "loads in ranges are mixtures of two slow displacements"
+            yield ProblemFault(what, place, "give two ramps, of one direction each")
+    elif not isinstance(drive, DisplacementDrive):
+        what = f"a drive of the kind {drive.kind} has no displacement and direction to vary"
+        yield ProblemFault(what, place, "leave it out, or displace units along a direction")
+    elif ranges.frequency is not None and problem.frequency is None:
+        what = f"a {drive.kind} drive has no frequency to vary"
+        yield ProblemFault(what, (*place, "frequency"), "leave it out")
+    elif ranges.frequency is not None and problem.horizon.periods is None:
+        what = "a time does not fit loads of all frequencies"
+        yield ProblemFault(what, ("horizon", "duration"), "give `periods`")
 
 
 def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:

@@ -14,9 +14,11 @@ from .drives import RampHarmonicDrive as RampHarmonicDrive
 from .drives import RotationDrive as RotationDrive
 from .drives import SeveralDrives as SeveralDrives
 from .drives import SingleDrive as SingleDrive
+from .drives import Support as Support
 from .drives import TanhRampDrive as TanhRampDrive
 from .drives import TimeSeriesDrive as TimeSeriesDrive
 from .drives import TorqueDrive as TorqueDrive
+from .drives import read_several as read_several
 from .drives import single_drives as single_drives
 from .fabrication import Fabrication as Fabrication
 from .fabrication import Fixture as Fixture
@@ -38,6 +40,7 @@ from .objective import Load as Load
 from .objective import LoadRanges as LoadRanges
 from .objective import ObjectiveSection as ObjectiveSection
 from .objective import Robust as Robust
+from .objective import TestSetup as TestSetup
 from .optimiser import Method as Method
 from .optimiser import Methods as Methods
 from .optimiser import Optimiser as Optimiser

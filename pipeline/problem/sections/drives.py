@@ -1,4 +1,4 @@
-"""Describes what drives units: one model per kind, told apart by the key `kind`.
+"""Describes what holds units, and what drives them: one model per kind, told apart by `kind`.
 
 Driven units have all three degrees of freedom prescribed: the displacement follows the drive along
 one direction per load case, the rotation is held (a time series prescribes all three). `free` sets
@@ -29,6 +29,18 @@ from pipeline.problem.sections.selectors import Selector
 
 _SUM_TOLERANCE = 1e-6
 Dof = Literal["ux", "uy", "theta"]
+
+
+class Support(Section):
+    """Units with some of their degrees of freedom held at zero.
+
+    Attributes:
+        units: by side, or listed.
+        clamp: the degrees of freedom.
+    """
+
+    units: Selector
+    clamp: Annotated[tuple[Dof, ...], Field(min_length=1)] = ("ux", "uy", "theta")
 
 
 class _Drive(Section):
@@ -350,6 +362,25 @@ class SeveralDrives(Section):
 
 
 Drive = Annotated[SingleDrive | SeveralDrives, Field(discriminator="kind")]
+
+
+def read_several(data: object) -> object:
+    """Reads a list under `drives`, of a section that has a `drive`, as a drive of several at once.
+
+    Raises:
+        PydanticCustomError: the section has both, or a list in the wrong place.
+    """
+    if not isinstance(data, Mapping):
+        return data
+    if isinstance(data.get("drive"), list):
+        remedy = "write them below it, or several drives in a list under `drives`"
+        raise fault("keys and values are wanted here", remedy, "drive")
+    if "drives" not in data:
+        return data
+    if "drive" in data:
+        raise fault("drive and drives exclude each other", "give one of them", "drives")
+    others = {key: value for key, value in data.items() if key != "drives"}
+    return {**others, "drive": {"kind": "several", "drives": data["drives"]}}
 
 
 def single_drives(drive: SingleDrive | SeveralDrives) -> tuple[SingleDrive, ...]:

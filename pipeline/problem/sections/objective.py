@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from pipeline.problem.fields import Angle, Count, Frequency, Length, Positive, Ratio, Section, fault
+from pipeline.problem.sections.drives import Drive, Support, read_several
 from pipeline.problem.sections.regions import Region
 
 
@@ -48,28 +49,20 @@ class Robust(Section):
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
 
-class LoadRanges(Section):
-    """Loads of the drive's kind in ranges, each from its least to its greatest value.
-
-    The design minimises the worst loss under any of them. The loss under a load is relative to its
-    size: with the target at rest it counts with the square of the drive's amplitude over the
-    load's.
+class _Ranges(Section):
+    """Ranges of loads, each from its least to its greatest value.
 
     Attributes:
-        directions: of the motion; the drive's outermost ones by default.
-        amplitude: of the motion; the drive's by default.
+        directions: of the motion; the drive's outermost ones by default. Of two drives at once, of
+            their amplitudes: 0 deg is the first alone, 90 deg the second.
+        amplitude: of the motion; the drive's by default. Of two drives at once, the root of the sum
+            of their squares.
         frequency: of a harmonic drive, whose horizon is in periods; the drive's by default.
-        sharpness: p of the p-mean of the losses under the worst loads found so far.
-        nominal: share, in what is minimised, of the mean loss under the drive's own loads.
-        search_every: evaluations of the design, after which the worst load is searched again.
     """
 
     directions: tuple[Angle, Angle] | None = None
     amplitude: tuple[Length, Length] | None = None
     frequency: tuple[Frequency, Frequency] | None = None
-    sharpness: Annotated[float, Field(ge=1.0, le=64.0)] = 16.0
-    nominal: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    search_every: Count = 16
 
     @model_validator(mode="after")
     def _ascend(self) -> Self:
@@ -78,6 +71,45 @@ class LoadRanges(Section):
             if given is not None and given[0] > given[1]:
                 raise fault("the range runs backwards", "give the least value first", name)
         return self
+
+
+class TestSetup(_Ranges):
+    """Another set-up of the structure, with loads of its own in ranges.
+
+    Amplitudes and frequencies that are left out are those of the loads in the study's set-up.
+
+    Attributes:
+        supports: in it; none by default.
+        drive: in it; a list of what moves it at once may stand under `drives` instead.
+    """
+
+    supports: tuple[Support, ...] = ()
+    drive: Drive
+
+    @model_validator(mode="before")
+    @classmethod
+    def _several_drives(cls, data: object) -> object:
+        return read_several(data)
+
+
+class LoadRanges(_Ranges):
+    """Loads of the drive's kind in ranges, each from its least to its greatest value.
+
+    The design minimises the worst loss under any of them. The loss under a load is relative to its
+    size: with the target at rest it counts with the square of the drive's amplitude over the
+    load's.
+
+    Attributes:
+        setups: other supports and drives, under which it is to hold loads as well.
+        sharpness: p of the p-mean of the losses under the worst loads found so far.
+        nominal: share, in what is minimised, of the mean loss under the drive's own loads.
+        search_every: evaluations of the design, after which the worst load is searched again.
+    """
+
+    setups: tuple[TestSetup, ...] = ()
+    sharpness: Annotated[float, Field(ge=1.0, le=64.0)] = 16.0
+    nominal: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    search_every: Count = 16
 
 
 class ObjectiveSection(Section):

@@ -9,7 +9,7 @@ from pipeline.problem.identity import canonical_json
 from pipeline.runtime import UserError
 from sim.scene import Scene, simulate
 from tests.pipeline import static
-from tests.tables import cases
+from tests.tables import cases, refused
 
 PUSH = "{ kind: force, units: right, amplitude: 0.5 N, direction: 180 deg, free: [uy] }"
 TURN = "{ kind: rotation, units: { units: [[2, 0]] }, amplitude: 10 deg }"
@@ -68,6 +68,35 @@ def test_several_drives_act_at_once_in_all_directions(tmp_path: Path) -> None:
     assert len(scene.loads.cases) == 2
     ends = [case.forces(np.array([1.0]))[0, -1, :2] for case in scene.loads.cases]
     np.testing.assert_allclose(ends, [[-0.1, 0.0], [0.0, 0.1]], atol=1e-12)
+
+
+PLATES = """supports:
+  - { units: left, clamp: [ux, theta] }
+  - { units: bottom, clamp: [uy, theta] }
+drives:
+  - { units: right, amplitude: 9 mm, direction: 180 deg, free: [uy], KIND }
+  - { units: top, amplitude: 6 mm, direction: 270 deg, free: [ux], KIND }
+""".replace("KIND", "kind: linear_ramp, duration: 1 s")
+
+
+def test_plates_on_rollers_share_the_units_at_corners(tmp_path: Path) -> None:
+    path = written(tmp_path, PLATES)
+    path.write_text(path.read_text().replace("supports:\n  - units: left\n", "", 1))
+    scene = scene_of(load(path), tmp_path).objective.reference
+    assert scene is not None
+    end = moved(scene)[-1].reshape(5, 5, 3)  # row by row
+    np.testing.assert_allclose(end[:, 4, 0], -9.0)
+    np.testing.assert_allclose(end[4, :, 1], -6.0)
+    np.testing.assert_array_equal(end[:, 0, 0], 0.0)
+    np.testing.assert_array_equal(end[0, :, 1], 0.0)
+    assert -6.0 < end[2, 4, 1] < 0.0
+    text = path.read_text()
+    path.write_text(text.replace(", free: [uy]", ""))
+    with refused("unit [4, 4] is driven twice, along uy", "drives[1].units"):
+        load(path)
+    path.write_text(text.replace("clamp: [uy, theta]", "clamp: [ux, theta]"))
+    with refused("unit [4, 0] is driven and clamped", "drives[0].units"):
+        load(path)
 
 
 def test_a_force_has_a_course_in_time(tmp_path: Path) -> None:

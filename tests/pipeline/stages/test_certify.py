@@ -7,6 +7,7 @@ import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
+from pipeline.posing import load_family
 from pipeline.problem.reading import load, overlay_keys
 from pipeline.stages import certify
 from reports.__main__ import main
@@ -131,3 +132,17 @@ def test_ranges_left_out_are_the_drives_own(fig2: Path) -> None:
     assert own.amplitude == (1.0, 4.5)
     assert own.directions == (0.0, np.pi)
     assert own.nominal == 0.0
+
+
+def test_set_ups_have_loads_of_their_own(fig2: Path) -> None:
+    path = fig2.parents[1] / "fig5" / "problem.yaml"
+    family = load_family(load(path, "unbiased"), path.parent)
+    assert family is not None
+    own, turned, plates = family.setups
+    assert (own.amplitude, turned.amplitude, plates.amplitude) == ((1.5, 21.0),) * 3
+    np.testing.assert_allclose(np.rad2deg(turned.direction), [180.0, 360.0])
+    assert (own.scene, plates.own_amplitude) == (None, np.hypot(15.0, 15.0))
+    assert turned.scene is not None
+    assert set(turned.scene.loads.clamped // 3).isdisjoint(turned.scene.loads.driven)
+    middle = family.numbers(np.array([[0.5, 0.5, 5 / 6]]))
+    np.testing.assert_allclose(middle, [[np.pi / 4, 11.25]])

@@ -12,8 +12,10 @@ from sim.load_family import (
     FoundLoad,
     LoadFamily,
     LoadLosses,
+    LoadSetup,
     SearchOptions,
     ascend,
+    directed,
     exchange,
     minimise_worst,
     spread_places,
@@ -21,18 +23,19 @@ from sim.load_family import (
 from sim.load_family.exchange import IDLE, LoadSet, without_copies
 from sim.load_family.worst_load import search_worst
 from sim.optimise import Evaluation, Journal, Result, SqpOptions, minimise
-from sim.scene import Scene, parameters_of_design, simulate
-from sim.solvers import Harmonic, LinearRamp
+from sim.scene import Clamp, Scene, parameters_of_design, simulate
+from sim.solvers import DISPLACEMENT, FREE, Harmonic, LinearRamp, PrescribedMotion, Together
 from tests.sim.scene.test_plan import design_of, scene
 from tests.sim.structures import central
 
-SHAKEN = LoadFamily(Harmonic(3.0, 5.0, 0.0), (0.0, np.pi), (1.0, 3.0), (2.0, 16.0))
-PUSHED = LoadFamily(LinearRamp(3.0, 0.2), (0.0, np.pi), (1.0, 3.0))
+SHAKING = LoadSetup(Harmonic(3.0, 5.0, 0.0), (0.0, np.pi), (1.0, 3.0), (2.0, 16.0))
+PUSHING = LoadSetup(LinearRamp(3.0, 0.2), (0.0, np.pi), (1.0, 3.0))
+SHAKEN, PUSHED = LoadFamily((SHAKING,)), LoadFamily((PUSHING,))
 
 
 def mimicked() -> Scene:
     """Pushed along any direction, with a void whose surroundings are to move as without it."""
-    intact = scene(motions=(PUSHED.motion,), static=True, steps=3)
+    intact = scene(motions=(PUSHING.motion,), static=True, steps=3)
     lattice = intact.lattice.without(np.array([8]))
     region = lattice.positions(intact.lattice.id[intact.objective.region])
     units = lattice.positions(np.array([24]))
@@ -46,6 +49,44 @@ def mimicked() -> Scene:
         cloak=lattice.positions(intact.design.cloak[intact.design.cloak != 8]),
         reference=intact,
     )
+
+
+def in_two_setups() -> tuple[LoadFamily, Scene]:
+    """Pushed at the middle, or held at two corners and pushed by two others along x and y."""
+    held = mimicked()
+    ramps = LinearRamp(3.0, 0.2), LinearRamp(4.0, 0.2, np.pi / 2)
+
+    def other(of: Scene) -> Scene:
+        corners = of.lattice.positions(np.array([0, 6, 42, 48]))
+        control = np.array([[DISPLACEMENT, FREE, DISPLACEMENT], [FREE, DISPLACEMENT, DISPLACEMENT]])
+        drive = PrescribedMotion(corners[1:3], Together(ramps, np.eye(2)), control)
+        reference = of.objective.reference
+        return of.updated(
+            cases=(drive,),
+            supports=(Clamp(corners[[0, 3]]),),
+            reference=reference and other(reference),
+        )
+
+    mixed = LoadSetup(Together(ramps, np.eye(2)), (0.5, 1.5), (1.0, 6.0), scene=other(held))
+    return LoadFamily((PUSHING, mixed)), held
+
+
+def test_a_mixture_is_a_direction_among_two_motions() -> None:
+    family, posed = in_two_setups()
+    mixed = family.setups[1]
+    place = mixed.place(mixed.motion)
+    np.testing.assert_allclose(mixed.numbers(place), [np.arctan2(4, 3), 5.0])
+    at = family.centred(np.array([0.2, 0.6, 0.9]))
+    np.testing.assert_array_equal(at, [0.2, 0.6, 0.75])
+    np.testing.assert_allclose(
+        family.numbers(np.stack([at, 0.4 * at])), [[0.7, 4.0], [0.08 * np.pi, 1.48]]
+    )
+    moved = directed(mixed.motion, 0.7, 4.0)
+    under = mixed.posed(posed).under((moved,), 0.2, None)
+    design = design_of(posed, 0.2)
+    found = LoadLosses(posed, family, parameters_of_design(posed)).value(design, at)
+    vertices = np.asarray(posed.space.vertices(design))
+    assert found == pytest.approx(float(simulate(under, vertices=vertices).loss), rel=1e-9)
 
 
 @pytest.mark.parametrize("place", [(0.1, 0.7, 0.95), (0.4, 1.0, 0.3)])
@@ -66,6 +107,16 @@ def test_derivatives_by_the_design_and_by_the_load(family: LoadFamily, posed: ob
     made: Scene = posed()  # type: ignore[operator]
     losses = LoadLosses(made, family, parameters_of_design(made))
     design, at = design_of(made, 0.2), np.array([0.3, 0.6, 0.9][: family.size])
+    check_derivatives(losses, design, at)
+
+
+def test_derivatives_in_another_setup() -> None:
+    family, posed = in_two_setups()
+    losses = LoadLosses(posed, family, parameters_of_design(posed))
+    check_derivatives(losses, design_of(posed, 0.2), np.array([0.3, 0.6, 0.75]))
+
+
+def check_derivatives(losses: LoadLosses, design: Floats, at: Floats) -> None:
     found = losses(design, at)
     assert found.value == losses.value(design, at)
     way = found.by_design / np.linalg.norm(found.by_design)
@@ -79,8 +130,8 @@ def test_derivatives_by_the_design_and_by_the_load(family: LoadFamily, posed: ob
 def test_octaves_count_from_the_highest_frequency() -> None:
     frequencies = (16.0, 15.9, 8.0, 7.9, 2.0)
     places = [SHAKEN.place(Harmonic(2.0, f, 0.5)) for f in frequencies]
-    assert [SHAKEN.octave(place) for place in places] == [0, 0, 1, 1, 3]
-    switched = LoadFamily(Harmonic(1.0, 4.0, rise=0.2, delay=0.5), (0, 1), (1, 2), (1.0, 16.0))
+    assert [SHAKING.octave(place) for place in places] == [0, 0, 1, 1, 3]
+    switched = LoadSetup(Harmonic(1.0, 4.0, rise=0.2, delay=0.5), (0, 1), (1, 2), (1.0, 16.0))
     fastest = switched.fastest(1)
     assert isinstance(fastest, Harmonic)
     assert fastest == Harmonic(2.0, 8.0, 0.0, rise=0.1, delay=0.25)
@@ -136,7 +187,7 @@ def test_places_are_spread_alike_and_copies_left_out() -> None:
     assert places.min() >= 0.0
     assert (np.histogram(places[:, 0], 2, (0, 1))[0] >= 4).all()
     folded = without_copies(SHAKEN, scene().updated(symmetry="C4"))
-    assert folded.direction == (0.0, np.pi / 2)
+    assert folded.setups[0].direction == (0.0, np.pi / 2)
     assert without_copies(SHAKEN, scene()) == SHAKEN
 
 
