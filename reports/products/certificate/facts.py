@@ -4,9 +4,8 @@ from collections.abc import Iterator
 
 import xarray as xr
 
-from pipeline.posing import worst_load
 from reports.facts import Fact, facts_of, grouped, measures
-from reports.products.certificate.figure import CertifiedDesign
+from reports.products.certificate.figure import CertifiedDesign, load_text
 
 NEAR = 0.95
 """Of the greatest loss that a search ended at: those above it found the same worst."""
@@ -36,11 +35,9 @@ def _family(of: xr.Dataset) -> Iterator[Fact]:
 
 
 def _worst(found: CertifiedDesign) -> Iterator[Fact]:
-    worst, ends = worst_load(found.data), found.own["found_loss"]
-    words = [f"{worst['direction']:.3g}°", f"{worst['amplitude']:.3g} mm"]
-    words += [f"{worst['frequency']:.3g} Hz"] if found.harmonic else []
+    ends = found.own["found_loss"]
     yield _told("searches", ends.size)
-    yield _told("worst_found", found.most, load=", ".join(words))
+    yield _told("worst_found", found.most, load=load_text(found))
     yield _told("near", int((ends > NEAR * ends.max()).sum()))
     reduction = measures.reduction(found.worst.response["loss"].isel(case=0))
     yield _told("reduction", reduction)

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from pipeline.posing import worst_load
+from pipeline.problem.sections import SeveralDrives
 from reports.base import Table, prose, style
 from reports.panels import (
     CLAMP_TINT,
@@ -33,6 +34,8 @@ _COLOURS = {"cloaked": style.CLOAKED, "study": style.GREY}
 _NAMES = {"cloaked": "this design", "study": "the study's own"}
 _AXES = {"frequency": "frequency (Hz)", "amplitude": "amplitude (mm)", "direction": "direction (°)"}
 _UNIT_TINT = "#c3c7cc"
+_MARKERS = "os^Dv"
+"""Of the loads in each set-up."""
 _TOP, _LOW, _HIGH, _HEIGHT = 11.0, 70.0, 36.0, 119.0
 
 
@@ -47,6 +50,11 @@ class CertifiedDesign:
     def harmonic(self) -> bool:
         """Tells whether the loads have a frequency."""
         return bool(self.data["load_frequency"].notnull().all())
+
+    @property
+    def setups(self) -> int:
+        """Counts the set-ups of supports and drives."""
+        return 1 + int(self.data["load_setup"].max())
 
     @property
     def own(self) -> xr.Dataset:
@@ -126,7 +134,8 @@ def certificate_figure(found: CertifiedDesign) -> PanelFigure:
 def _tables(data: xr.Dataset) -> list[Table]:
     def columns(name: str, loss: str) -> dict[str, np.ndarray]:
         """Loads of one kind, a row for each design and load."""
-        parts = [f"{name}_direction", f"{name}_amplitude", f"{name}_frequency", loss]
+        parts = [f"{name}_{part}" for part in ("setup", "direction", "amplitude", "frequency")]
+        parts.append(loss)
         rows = data[["design", *parts]].to_dataframe().reset_index()
         return {"design": rows["design"].to_numpy()} | {
             f"{part} ({data[part].attrs.get('units', '1')})": rows[part].to_numpy()
@@ -157,8 +166,8 @@ def _label(data: xr.Dataset) -> str:
 
 def _design(figure: Figure, found: CertifiedDesign) -> None:
     axes = style.place(figure, 2.0, 7.0, 44.0, 44.0)
-    problem, design = found.worst.problem, found.worst.design
-    structure = from_dataset(design, problem.lattice.spacing)
+    problem, shown = found.worst.problem, found.worst.response.sel(structure="cloaked")
+    structure = from_dataset(shown, problem.lattice.spacing)
     draw_clamps(axes, structure, problem.lattice.spacing)
     held = {CLAMPED: CLAMP_TINT, DRIVEN: style.ALTERED}
     draw(axes, structure, colours=tints(structure, held, {CLOAK: CLOAK_TINT}, _UNIT_TINT))
@@ -168,14 +177,21 @@ def _design(figure: Figure, found: CertifiedDesign) -> None:
     reach = 0.75 * problem.lattice.spacing, 2.2 * problem.lattice.spacing
     if found.harmonic:
         drive_arrows(axes, driven, worst["direction"], reach, style.ALTERED)
-    else:
+    elif not isinstance(problem.drive, SeveralDrives):
         angle = np.radians(worst["direction"])
         start, end = (driven + size * np.array([np.cos(angle), np.sin(angle)]) for size in reach)
         arrow(axes, start, end, style.ALTERED, 7.0)
-    words = [f"{worst['direction']:.0f}°", f"{worst['amplitude']:.3g} mm"]
-    words += [f"{worst['frequency']:.3g} Hz"] if found.harmonic else []
-    told = f"worst load: {', '.join(words)}"
+    told = f"worst load: {load_text(found)}"
     style.write(figure, 24.0, 51.0, told, ha="center", fontsize=style.SMALL)
+
+
+def load_text(found: CertifiedDesign) -> str:
+    """Describes the worst load that was found."""
+    worst = worst_load(found.data)
+    words = [f"{worst['direction']:.3g}°", f"{worst['amplitude']:.3g} mm"]
+    words += [f"{worst['frequency']:.3g} Hz"] if found.harmonic else []
+    words += [f"set-up {worst['setup'] + 1:.0f}"] if found.setups > 1 else []
+    return ", ".join(words)
 
 
 def _circle(axes: Axes, found: CertifiedDesign) -> None:
@@ -205,10 +221,12 @@ def _map(figure: Figure, axes: Axes, found: CertifiedDesign) -> None:
     own, across = found.own, found.axes[0]
     order = np.argsort(own["loss"].values)
     norm = Normalize(0.0, found.most)
-    axes.scatter(
-        own[f"load_{across}"][order], own["load_amplitude"][order], c=own["loss"][order],
-        cmap=style.MAGNITUDE, norm=norm, s=5.0, linewidths=0.0,
-    )  # fmt: skip
+    for number, marker in zip(range(found.setups), _MARKERS, strict=False):
+        of = order[own["load_setup"].values[order] == number]
+        axes.scatter(
+            own[f"load_{across}"][of], own["load_amplitude"][of], c=own["loss"][of],
+            cmap=style.MAGNITUDE, norm=norm, s=5.0, linewidths=0.0, marker=marker,
+        )  # fmt: skip
     axes.scatter(
         own[f"found_{across}"], own["found_amplitude"], s=14.0, facecolors="none",
         edgecolors=style.CLOAKED, linewidths=0.7, clip_on=False, zorder=5,

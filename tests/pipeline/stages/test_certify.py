@@ -106,11 +106,19 @@ def test_the_page_shows_the_worst_load(
     assert facts["reduction"].value == pytest.approx(100 * reduction)
 
 
-def test_the_page_of_a_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    ranges = "target: intact, loads: { directions: [170 deg, 190 deg] }"
+FROM_ABOVE = (
+    ", setups: [{ supports: [{ units: bottom }], drive: { kind: linear_ramp, units: top,"
+    " amplitude: 3 mm, duration: 1 s, direction: 270 deg } }]"
+)
+
+
+@pytest.mark.parametrize("setups", ["", FROM_ABOVE])
+def test_the_page_of_a_path(setups: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ranges = f"target: intact, loads: {{ directions: [170 deg, 190 deg]{setups} }}"
     more = static.HOLE.replace("target: intact", ranges)
     path = static.write(tmp_path, more, size=5, amplitude=3.0)
     text = page_of(path, certified(path, tmp_path, monkeypatch), tmp_path / "page")
+    assert ("set-up " in text) == bool(setups)
     assert "motion of the intact lattice" in text
     assert 'id="player-data"' in text
 
