@@ -71,9 +71,9 @@ def _simulations(asked: Problem) -> int:
     """Counts the simulations of an evaluation, each of all loads of the drive."""
     if asked.objective.snap == "avoid":
         return AVOIDING
-    if asked.objective.loads is not None:
-        return FAMILY
     robust = asked.objective.robust
+    if asked.objective.loads is not None:
+        return FAMILY * max(1, 0 if robust is None else robust.copies)
     return 1 if robust is None else max(1, robust.copies) * (1 + len(robust.loads))
 
 

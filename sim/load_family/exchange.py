@@ -20,7 +20,7 @@ from sim.load_family.family_losses import LoadFamily, LoadLosses
 from sim.load_family.worst_load import APART, FoundLoad, SearchOptions, search_worst
 from sim.optimise import Evaluate, Evaluation, Journal, Result, SqpOptions
 from sim.optimise import minimise as minimise_loss
-from sim.scene import DIRECTED, Scene, combined, constraints_of, make_plan, parameters_of_design
+from sim.scene import DIRECTED, Scene, combined, constraints_of, make_plan, parameters_of_copies
 from sim.solvers import MotionLaw, Together
 
 LOG = logging.getLogger(__name__)
@@ -161,7 +161,7 @@ def minimise_worst(
         InfeasibleStartError: no feasible design near the start.
         SimulationError: the start cannot be simulated.
     """
-    losses = LoadLosses(scene, without_copies(family, scene), parameters_of_design(scene))
+    losses = LoadLosses(scene, without_copies(family, scene), *parameters_of_copies(scene))
     held = LoadSet(losses, scene, options)
     wrap: Callable[[Evaluate], Evaluate] = (lambda f: f) if journal is None else journal.wrap
     search, evaluate = _Search(losses, wrap, options.search), wrap(held)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -17,7 +18,7 @@ import numpy as np
 from jax import Array
 
 from sim.core import Floats, Ints, Numbers
-from sim.scene import DIRECTED, Scene, concrete_parameters, make_plan, mimicking
+from sim.scene import DIRECTED, Scene, combined, concrete_parameters, make_plan, mimicking
 from sim.solvers import Harmonic, MotionLaw, Solver, Together, differentiable_motion
 from sim.structure import Parameters
 
@@ -184,13 +185,14 @@ class LoadLosses:
     Args:
         scene: what the loads act on; its horizon is of as many periods for each of them.
         family: the loads.
-        of_design: differentiable map of a design vector to parameters.
+        of_design: differentiable map of a design vector to parameters; several of imperfect copies,
+            the p-mean of whose losses counts then.
     """
 
     def __init__(
-        self, scene: Scene, family: LoadFamily, of_design: Callable[[Array], Parameters[Any]]
+        self, scene: Scene, family: LoadFamily, *of_design: Callable[[Array], Parameters[Any]]
     ) -> None:
-        self._scene, self.family, self._of_design = scene, family, of_design
+        self._scene, self.family, self._of_designs = scene, family, of_design
         self._octaves: dict[tuple[int, int], _Octave] = {}
 
     def __call__(self, design: Floats, place: Floats) -> LoadLoss:
@@ -199,7 +201,7 @@ class LoadLosses:
         Raises:
             SimulationError: a step failed.
         """
-        loss = jax.value_and_grad(self._octave(place).loss, argnums=(0, 1))
+        loss = jax.value_and_grad(self._loss(place), argnums=(0, 1))
         value, (by_design, by_place) = loss(jnp.asarray(design), jnp.asarray(place))
         return LoadLoss(float(value), np.asarray(by_design), np.asarray(by_place))
 
@@ -209,14 +211,27 @@ class LoadLosses:
         Raises:
             SimulationError: a step failed.
         """
-        return float(self._octave(place).loss(jnp.asarray(design), jnp.asarray(place)))
+        return float(self._loss(place)(jnp.asarray(design), jnp.asarray(place)))
+
+    def _loss(self, place: Floats) -> Callable[[Array, Array], Array]:
+        octave, copies = self._octave(place), self._of_designs
+        if len(copies) == 1:
+            return partial(octave.loss, copies[0])
+        shares = np.full(len(copies), 1 / len(copies))
+        sharpness = self._scene.objective.copy_sharpness
+
+        def mean(design: Array, place: Array) -> Array:
+            each = jnp.stack([octave.loss(copy, design, place) for copy in copies])
+            return combined(each, shares, sharpness)
+
+        return mean
 
     def _octave(self, place: Floats) -> _Octave:
         setup = self.family.setup(place)
         key = int(self.family.number(place)), setup.octave(place)
         if key not in self._octaves:
             own = self.family.setups[0].own_amplitude
-            self._octaves[key] = _Octave(self._scene, setup, key[1], own, self._of_design)
+            self._octaves[key] = _Octave(self._scene, setup, key[1], own)
         return self._octaves[key]
 
 
@@ -242,7 +257,6 @@ class _Octave:
         setup: LoadSetup,
         number: int,
         own_amplitude: float,
-        of_design: Callable[[Array], Parameters[Any]],
     ) -> None:
         scene = setup.posed(scene)
         fastest, duration, top = setup.fastest(number), scene.loads.duration, None
@@ -253,7 +267,6 @@ class _Octave:
         # explicit steps would have to be stable for the lowest frequency of the octave
         posed = scene.under((fastest,), duration, top, integrator="implicit")
         self._posed = _Posed(posed, make_plan(posed, every_case=True).solver)
-        self._of_design = of_design
         self._intact: tuple[_Posed, Parameters[Any]] | None = None
         if (intact := posed.objective.reference) is not None:
             plan = make_plan(intact, intact.lattice.vertices, every_case=True)
@@ -274,10 +287,12 @@ class _Octave:
 
         self._load, self._relative = jax.jit(load), jax.jit(relative)
 
-    def loss(self, design: Array, place: Array) -> Array:
+    def loss(
+        self, of_design: Callable[[Array], Parameters[Any]], design: Array, place: Array
+    ) -> Array:
         """Computes the loss of a design under the load at a place; differentiable by both."""
         motion, amplitude, ratio = self._load(place)
-        values = self._of_design(design)
+        values = of_design(design)
         moved, target = self._posed.displacement(values, motion, ratio), None
         if self._intact is not None:
             intact, constants = self._intact

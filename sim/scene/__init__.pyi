@@ -13,6 +13,7 @@ from .objectives import scales as scales
 from .objectives import strain_energies as strain_energies
 from .parameter_map import ParameterMap as ParameterMap
 from .parameter_map import concrete_parameters as concrete_parameters
+from .parameter_map import parameters_of_copies as parameters_of_copies
 from .parameter_map import parameters_of_design as parameters_of_design
 from .path_constraints import PathConstraints as PathConstraints
 from .path_constraints import foil_strains as foil_strains

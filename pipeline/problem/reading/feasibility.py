@@ -212,9 +212,9 @@ def _loads(problem: Problem) -> Findings:
         if (posed.static, posed.frequency is None) != (problem.static, problem.frequency is None):
             what = f"a {setup.drive.kind} drive is of another kind than the study's"
             yield ProblemFault(what, (*keys, "drive"), f"give one like a {problem.drive.kind}")
-    if objective.robust is not None:
+    if objective.robust is not None and objective.robust.loads:
         what = "loads in ranges take the place of some"
-        yield ProblemFault(what, ("objective", "robust"), "leave out one of the two")
+        yield ProblemFault(what, ("objective", "robust", "loads"), "leave out one of the two")
     if objective.snap == "avoid":
         what = "loads in ranges have no one path to keep from snapping"
         yield ProblemFault(what, ("objective", "snap"), "leave out one of the two")

@@ -23,8 +23,9 @@ from sim.load_family import (
 from sim.load_family.exchange import IDLE, LoadSet, without_copies
 from sim.load_family.worst_load import search_worst
 from sim.optimise import Evaluation, Journal, Result, SqpOptions, minimise
-from sim.scene import Clamp, Scene, parameters_of_design, simulate
+from sim.scene import Clamp, Scene, parameters_of_copies, parameters_of_design, simulate
 from sim.solvers import DISPLACEMENT, FREE, Harmonic, LinearRamp, PrescribedMotion, Together
+from sim.structure import Perturbation, draw_copies
 from tests.sim.scene.test_plan import design_of, scene
 from tests.sim.structures import central
 
@@ -107,6 +108,18 @@ def test_derivatives_by_the_design_and_by_the_load(family: LoadFamily, posed: ob
     made: Scene = posed()  # type: ignore[operator]
     losses = LoadLosses(made, family, parameters_of_design(made))
     design, at = design_of(made, 0.2), np.array([0.3, 0.6, 0.9][: family.size])
+    check_derivatives(losses, design, at)
+
+
+def test_imperfect_copies_count_by_their_p_mean() -> None:
+    made = scene()
+    copies = draw_copies(made.lattice, Perturbation(0.3, 0.1), 2, 0)
+    made = made.updated(copies=copies, copy_sharpness=4.0)
+    maps, design, at = parameters_of_copies(made), design_of(made, 0.2), np.array([0.3, 0.6, 0.9])
+    each = [LoadLosses(made, SHAKEN, of_copy).value(design, at) for of_copy in maps]
+    losses = LoadLosses(made, SHAKEN, *maps)
+    assert losses.value(design, at) == pytest.approx(np.mean(np.power(each, 4)) ** 0.25, rel=1e-12)
+    assert abs(each[0] - each[1]) > 1e-3 * each[0]
     check_derivatives(losses, design, at)
 
 
