@@ -38,7 +38,7 @@ _SOME = 40
 _SPARSE = 4
 """Every so manyth row and column tells how bright a picture is."""
 _EDGE_SIGMA = 0.02
-"""How well the outlines of a unit place it at best, px."""
+"""Standard error of a unit's place by its outlines at best, px."""
 
 
 class CameraCalibration(NamedTuple):
