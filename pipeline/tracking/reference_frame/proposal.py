@@ -112,6 +112,8 @@ def _doubts(best: _Candidate, like: list[str]) -> Iterator[str]:
     if doubt := ambiguity_text(best.ways):
         yield f"turned, mirrored: {doubt}"
     yield "window: whether the specimen is at rest in the first frame"
+    yield "readout: a phone's rows are read in 10 ms to 30 ms; untold, units seem to move where the"
+    yield "  camera does"
     yield "case: under which load case of the study it was"
     yield "load_axis: time, or driven displacement; load_cell: none was named"
 
