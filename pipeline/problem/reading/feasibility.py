@@ -204,10 +204,12 @@ def _loads(problem: Problem) -> Findings:
         return
     place = ("objective", "loads")
     yield from _ranges(problem, family, place)
+    yield from _drive_is_free(_turned(problem, family))
     for index, setup in enumerate(family.setups):
         posed, keys = problem.in_setup(setup), (*place, "setups", index)
+        turned = _turned(posed, setup)
         for check in (_units_exist, _drive_is_free, _one_kind_of_load, _horizon):
-            yield from (replace(found, keys=(*keys, *found.keys)) for found in check(posed))
+            yield from (replace(found, keys=(*keys, *found.keys)) for found in check(turned))
         yield from _ranges(posed, setup, keys)
         if (posed.static, posed.frequency is None) != (problem.static, problem.frequency is None):
             what = f"a {setup.drive.kind} drive is of another kind than the study's"
@@ -221,6 +223,16 @@ def _loads(problem: Problem) -> Findings:
     if problem.optimiser.methods.mma is not None:
         what = "the worst of many loads is minimised by sqp alone"
         yield ProblemFault(what, ("optimiser", "methods", "mma"), "leave it out (a preset: null)")
+
+
+def _turned(problem: Problem, ranges: LoadRanges | TestSetup) -> Problem:
+    """Turns the drive of a problem along all directions of a range, as far as that matters."""
+    if ranges.directions is None or not isinstance(problem.drive, DisplacementDrive):
+        return problem
+    low, high = ranges.directions
+    ways = (low, 0.75 * low + 0.25 * high, high)  # not all along one axis, unless the range is
+    drive = problem.drive.model_copy(update={"directions": ways, "weights": None})
+    return problem.model_copy(update={"drive": drive})
 
 
 def _ranges(problem: Problem, ranges: LoadRanges | TestSetup, place: KeyPath) -> Findings:

@@ -70,6 +70,10 @@ def test_several_drives_act_at_once_in_all_directions(tmp_path: Path) -> None:
     np.testing.assert_allclose(ends, [[-0.1, 0.0], [0.0, 0.1]], atol=1e-12)
 
 
+RAMP = (
+    "{ kind: linear_ramp, units: right, amplitude: 9 mm, duration: 1 s, direction: 180 deg,"
+    " free: [uy] }"
+)
 PLATES = """supports:
   - { units: left, clamp: [ux, theta] }
   - { units: bottom, clamp: [uy, theta] }
@@ -96,6 +100,17 @@ def test_plates_on_rollers_share_the_units_at_corners(tmp_path: Path) -> None:
         load(path)
     path.write_text(text.replace("clamp: [uy, theta]", "clamp: [ux, theta]"))
     with refused("unit [4, 0] is driven and clamped", "drives[0].units"):
+        load(path)
+
+
+def test_no_load_of_a_range_moves_what_is_clamped(tmp_path: Path) -> None:
+    roller = "supports:\n  - { units: left }\n  - { units: bottom, clamp: [uy] }\n"
+    path = written(tmp_path, f"{roller}drive: {RAMP}")
+    text = path.read_text().replace("supports:\n  - units: left\n", "", 1)
+    path.write_text(text)
+    assert len(load(path).supports) == 2
+    path.write_text(text.replace("intact", "intact, loads: { directions: [180 deg, 200 deg] }"))
+    with refused("unit [4, 0] is driven and clamped", "drive.units"):
         load(path)
 
 
