@@ -22,6 +22,7 @@ from .response_dataset import assemble_response as assemble_response
 from .response_dataset import case_directions as case_directions
 from .response_dataset import loss_units as loss_units
 from .robust_scene import design_scene as design_scene
+from .robust_scene import greatest_loss as greatest_loss
 from .robust_scene import load_family as load_family
 from .robust_scene import under_worst as under_worst
 from .robust_scene import worst_load as worst_load

@@ -69,12 +69,10 @@ def cost_line(asked: Problem, scene: Scene) -> str:
 
 def _simulations(asked: Problem) -> int:
     """Counts the simulations of an evaluation, each of all loads of the drive."""
-    if asked.objective.snap == "avoid":
-        return AVOIDING
-    robust = asked.objective.robust
-    if asked.objective.loads is not None:
-        return FAMILY * max(1, 0 if robust is None else robust.copies)
-    return 1 if robust is None else max(1, robust.copies) * (1 + len(robust.loads))
+    objective, robust = asked.objective, asked.objective.robust
+    copies, others = (1, 0) if robust is None else (max(1, robust.copies), len(robust.loads))
+    paths = AVOIDING if objective.snap == "avoid" else 1
+    return paths * copies * (1 + others if objective.loads is None else FAMILY)
 
 
 def _span(seconds: float) -> str:

@@ -85,6 +85,11 @@ def _setup(asked: Problem, ranges: LoadRanges | TestSetup, folder: Path) -> Load
     )
 
 
+def greatest_loss(of: xr.Dataset) -> float:
+    """Finds the greatest loss of one design, of all that its certificate tried."""
+    return max(float(of["loss"].max()), float(of["found_loss"].max()))
+
+
 def worst_load(certificate: xr.Dataset) -> dict[str, float]:
     """Finds the load of the greatest loss of a design, of all that a certificate tried.
 
@@ -92,8 +97,8 @@ def worst_load(certificate: xr.Dataset) -> dict[str, float]:
     its set-up is numbered, the study's own is the first.
     """
     of = certificate.sel(design="cloaked")
-    random, found = (float(of[name].max()) for name in ("loss", "found_loss"))
-    kind, loss = ("load", "loss") if random > found else ("found", "found_loss")
+    random = float(of["loss"].max()) == greatest_loss(of)
+    kind, loss = ("load", "loss") if random else ("found", "found_loss")
     number = int(np.nanargmax(of[loss].values))
     parts = ("direction", "amplitude", "frequency", "setup")
     return {part: float(of[f"{kind}_{part}"].values[number]) for part in parts}

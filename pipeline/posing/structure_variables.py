@@ -105,9 +105,9 @@ def of_problem(asked: Problem, design: xr.Dataset) -> bool:
     intact = lattice_of(asked)
     start, found = intact.padded(intact.vertices), design["vertices_initial"].values
     alike = found.shape == start.shape and np.allclose(found, start, atol=_ALIKE, equal_nan=True)
-    units = altered_lattice_of(asked)
-    whole = not np.isnan(flat_vertices(units, design["vertices"])).any() if alike else False
-    return bool(alike and whole)
+    if not alike:
+        return False
+    return not np.isnan(flat_vertices(altered_lattice_of(asked), design["vertices"])).any()
 
 
 def spread(values: Floats, lattice: Lattice, size: int, axis: int = 0) -> Floats:

@@ -15,6 +15,7 @@ from snakemake.iocontainers import Wildcards
 
 from pipeline.problem import Problem, outputs, over_measured_constants, section_hash
 from pipeline.problem.sections import design_name, group_count, split_name
+from pipeline.problem.sections import designs as designs_section
 from pipeline.runtime import RUN_MARK, WORK, UserError
 from pipeline.workflow import study_lock
 from pipeline.workflow.recordings import shown_recordings
@@ -30,8 +31,6 @@ from pipeline.workflow.studies import (
     together,
 )
 
-SHARE = "objective.loads.nominal"
-"""Sets the share of the drive's own loads, over which designs are a front."""
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
 
@@ -192,7 +191,8 @@ def front_designs(wildcards: Wildcards) -> dict[str, str]:
 def front_certificates(wildcards: Wildcards) -> list[str]:
     """Lists the certificates of the ends of a front: of the first and the last share of it."""
     groups = _in_ranges(wildcards.name).items()
-    fronts = [group for study, group in groups if SHARE in (problem_of(study).designs or {})]
+    share = designs_section.SHARE
+    fronts = [group for study, group in groups if share in (problem_of(study).designs or {})]
     return [f"results/{group[k]}/certificate.nc" for group in fronts for k in (0, -1)]
 
 

@@ -9,14 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline import datasets, problem
-from pipeline.problem.sections import split_name, split_value
+from pipeline.posing import greatest_loss
+from pipeline.problem.sections import designs, split_name, split_value
 from reports.base import Table, prose, style
 from reports.page import FigureText, PageTable, figure_page, publish, titled
 from reports.panels import Panel, PanelFigure
 from sim.core import Floats
 
-SHARE = "objective.loads.nominal"
-"""The parameter that a front is over."""
 PER_ROW = 3
 """Panels in a row, at most; four stand two by two."""
 _PROSE = prose(__file__)
@@ -69,7 +68,7 @@ def front_figure(data: xr.Dataset, certified: Mapping[str, xr.Dataset]) -> Panel
     """Returns the figure: the front, then both losses over every other parameter."""
     presets = [split_name(name)[0] for name in _designs(data)]
     series = [data.isel(design=np.array(presets) == name) for name in dict.fromkeys(presets)]
-    series.sort(key=lambda each: _parameter(each) != SHARE)
+    series.sort(key=lambda each: _parameter(each) != designs.SHARE)
     count = 2 if len(series) == PER_ROW + 1 else PER_ROW
     each_wide = (style.TWO_COLUMNS + _GAP) / count
     columns = {str(name): data[name].values for name in data.variables}
@@ -95,7 +94,7 @@ def _panel(
     """Describes one panel at a place: mm from left and top, and its width."""
     left, top, wide = place
     name = _NAMES.get(_parameter(series), _parameter(series))
-    is_front = _parameter(series) == SHARE
+    is_front = _parameter(series) == designs.SHARE
 
     def draw(figure: Figure) -> None:
         axes = style.place(figure, left + _LEFT, top + _HEAD, wide - _LEFT, _HIGH)
@@ -114,16 +113,8 @@ def _front(axes: Axes, series: xr.Dataset, certified: Mapping[str, xr.Dataset]) 
     axes.plot(own, worst, "-o", color=_WORST, ms=3.2, lw=0.8)
     for name in (name for name in _designs(series) if name in certified):
         of = certified[name].sel(design="cloaked")
-        most = max(float(of["loss"].max()), float(of["found_loss"].max()))
-        axes.plot(
-            float(series["nominal_loss"].sel(design=name)),
-            most,
-            "s",
-            mfc="none",
-            color=_WORST,
-            ms=5.5,
-            mew=0.8,
-        )
+        place = float(series["nominal_loss"].sel(design=name)), greatest_loss(of)
+        axes.plot(*place, "s", mfc="none", color=_WORST, ms=5.5, mew=0.8)
     places = np.stack([own, worst], axis=-1)
     size = np.ptp(places, axis=0) + np.finfo(float).tiny
     labelled: list[Floats] = []
@@ -143,8 +134,8 @@ def _unit(series: xr.Dataset) -> str:
 
 
 def _losses(axes: Axes, series: xr.Dataset, name: str, *, legend: bool) -> None:
-    found = [split_value(str(setting)) for setting in series["setting"].values]
     settings = [str(setting) for setting in series["setting"].values]
+    found = [split_value(setting) for setting in settings]
     numbers = all(found)
     place = np.array([each[0] for each in found if each]) if numbers else np.arange(len(found))
     for key, line, colour, label in (

@@ -11,6 +11,8 @@ from pydantic import Field
 from pipeline.problem.sections.sweep import Values
 from pipeline.problem.sections.sweep_cases import apply_setting
 
+SHARE = "objective.loads.nominal"
+"""The parameter over which designs are a front: the share of the drive's own loads."""
 Designs = Annotated[dict[str, Values], Field(min_length=1, max_length=1)]
 
 

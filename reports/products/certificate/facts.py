@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import xarray as xr
 
+from pipeline.posing import greatest_loss
 from reports.facts import Fact, facts_of, grouped, measures
 from reports.products.certificate.figure import CertifiedDesign, load_text
 
@@ -49,5 +50,5 @@ def _own(of: xr.Dataset) -> Iterator[Fact]:
 
 
 def _study(of: xr.Dataset) -> Iterator[Fact]:
-    yield _told("study_worst", max(float(of["loss"].max()), float(of["found_loss"].max())))
+    yield _told("study_worst", greatest_loss(of))
     yield _told("study_nominal", float(of["nominal_loss"]))

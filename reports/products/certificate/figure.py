@@ -10,7 +10,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from pipeline.posing import worst_load
+from pipeline.posing import greatest_loss, worst_load
 from pipeline.problem.sections import SeveralDrives
 from reports.base import Table, prose, style
 from reports.panels import (
@@ -64,7 +64,7 @@ class CertifiedDesign:
     @property
     def most(self) -> float:
         """Returns the greatest loss of the design, of all that was tried."""
-        return max(float(self.own["loss"].max()), float(self.own["found_loss"].max()))
+        return greatest_loss(self.own)
 
     @property
     def axes(self) -> tuple[str, str]:
