@@ -74,10 +74,11 @@ def _keep(
 ) -> Path | None:
     """Writes the response of a static path as far as all structures can be followed, if at all."""
     scene, step = structures[stopped.name].scene, stopped.error.step
-    whole = scene.objective.steps or 1
-    reached = 0.0 if not step else stopped.asked[step - 1] / scene.loads.duration
-    steps = int(whole * reached * (1 + 1e-9))
-    if not scene.loads.static or scene.objective.steps is None or steps == 0:
+    if not scene.loads.static or scene.objective.steps is None or not step:
+        return None  # a step in time is the solver's own, of no use to others
+    reached = stopped.asked[step - 1] / scene.loads.duration
+    steps = int(scene.objective.steps * reached * (1 + 1e-9))
+    if steps == 0:
         return None
     shorter = {
         name: each._replace(scene=_until(each.scene, steps)) for name, each in structures.items()
