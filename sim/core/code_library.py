@@ -3,14 +3,20 @@
 Numba optimises every function with all that it calls, and makes machine code of it, though a loop
 takes a copy of what it calls and optimises that again. Here a library stays LLVM's intermediate
 code, inlined at little cost, until somebody asks for the address of a function in it.
+
+Numba also makes the code of an `inlined` loop anew for each call, then copies it twice, block by
+block, each with all variables of the loop. Here it goes in as it was made.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from types import FunctionType
-from typing import Any
+from typing import Any, Self
 
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.inline_closurecall import InlineWorker
+from numba.core.ir import Block
 from numba.core.registry import CPUDispatcher, cpu_target
 
 
@@ -77,7 +83,9 @@ class DeferredLibrary(JITCodeLibrary):
 
 
 def install() -> None:
-    """Makes Numba keep the code of this process so."""
+    """Makes Numba keep and inline the code of this process so."""
+    worker: Any = InlineWorker
+    worker.inline_function = _inline_function
     codegen: Any = cpu_target.target_context.codegen()
     codegen._library_class = DeferredLibrary
     codegen.set_env = _set_env.__get__(codegen)
@@ -87,3 +95,37 @@ def _set_env(codegen: JITCPUCodegen, name: str, environment: object) -> None:
     """Sets the environment of a function that has machine code."""
     if codegen._engine.is_symbol_defined(name):
         JITCPUCodegen.set_env(codegen, name, environment)
+
+
+class _Owned(Block):
+    """Holds a block of which nobody else knows: its copy is itself."""
+
+    def __deepcopy__(self, _: object) -> Self:
+        return self
+
+
+def _inline_function(
+    worker: Any,  # noqa: ANN401  (Numba's own, untyped, as is its intermediate code)
+    caller: Any,  # noqa: ANN401
+    block: Block,
+    place: int,
+    function: FunctionType,
+    types: Any = None,  # noqa: ANN401
+) -> Any:  # noqa: ANN401
+    """Puts the code of a function in place of a call of it."""
+    code = worker.run_untyped_passes(function)
+    with _owned(list(code.blocks.values())):
+        free = function.__code__.co_freevars
+        return worker.inline_ir(caller, block, place, code, free, types)
+
+
+@contextmanager
+def _owned(blocks: list[Block]) -> Iterator[None]:
+    """Lets copies of blocks be these, as long as it lasts."""
+    for block in blocks:
+        block.__class__ = _Owned
+    try:
+        yield
+    finally:
+        for block in blocks:
+            block.__class__ = Block

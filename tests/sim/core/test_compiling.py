@@ -89,3 +89,43 @@ def test_only_what_python_calls_has_machine_code(tmp_path: Path) -> None:
     first, second = twice(tmp_path, MACHINE_CODE)
     assert first == ["9.0 1", "False False", "3.0 True"]
     assert second == ["9.0 0", "None False", "3.0 True"]  # none of it is even read
+
+
+INLINED = """
+import sys
+import numpy as np
+from numba.core.inline_closurecall import InlineWorker
+of_numba = InlineWorker.inline_function
+from sim.core.compiling import compiled, inlined
+if sys.argv[1:] == ["copied"]:
+    InlineWorker.inline_function = of_numba
+
+@inlined
+def innermost(values, k):
+    return values[k] * 2.0 if k % 2 else 1.0
+
+@inlined
+def inner(values):
+    total = 0.0
+    for k in range(len(values)):
+        total += innermost(values, k) - innermost(values, 0)
+    return total
+
+@compiled
+def outer(values):
+    return inner(values) + inner(values[1:])
+
+print(outer(np.arange(5.0)))
+print(*outer.inspect_llvm().values())
+"""
+
+
+def test_what_is_inlined_without_copies_is_the_same_code(tmp_path: Path) -> None:
+    (tmp_path / "loops.py").write_text(INLINED)
+    told = []
+    for how in ("copied", "as it is"):
+        places = {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / how)}
+        run = [sys.executable, str(tmp_path / "loops.py"), how]
+        told.append(subprocess.check_output(run, env=os.environ | places, text=True, timeout=120))
+    assert told[0].startswith("16.0\n")  # by hand
+    assert told[0] == told[1]
