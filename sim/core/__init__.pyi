@@ -15,3 +15,5 @@ from .errors import SimulationError as SimulationError
 from .import_graph import PACKAGES as PACKAGES
 from .import_graph import import_closure as import_closure
 from .import_graph import locate as locate
+from .outlined import address_of as address_of
+from .outlined import call_at as call_at

@@ -5,7 +5,9 @@ takes a copy of what it calls and optimises that again. Here a library stays LLV
 code, inlined at little cost, until somebody asks for the address of a function in it.
 
 Numba also makes the code of an `inlined` loop anew for each call, then copies it twice, block by
-block, each with all variables of the loop. Here it goes in as it was made.
+block, each with all variables of the loop: here it goes in as it was made. And each process that
+compiles an assignment of a slice compiles the text of an error that names the shapes, a second of
+work: here that error is a constant.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,6 +20,8 @@ from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.inline_closurecall import InlineWorker
 from numba.core.ir import Block
 from numba.core.registry import CPUDispatcher, cpu_target
+from numba.extending import overload
+from numba.np import arrayobj
 
 
 class Loop(CPUDispatcher):
@@ -61,6 +65,14 @@ class DeferredLibrary(JITCodeLibrary):
             return super().serialize_using_object_code()
         return self.serialize_using_bitcode()
 
+    def _optimize_functions(self, ll_module: Any) -> None:  # noqa: ANN401
+        """Tidies each function before it is inlined; what calls it optimises it in full."""
+        ll_module.data_layout = self._codegen._data_layout
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes, builder = self._codegen._function_pass_manager(opt=1)
+                passes.run(function, builder)
+
     def _optimize_final_module(self) -> None:
         """Inlines, and prunes counts of references: what calls it optimises it in full."""
         passes, builder = self._codegen._module_pass_manager(
@@ -83,9 +95,11 @@ class DeferredLibrary(JITCodeLibrary):
 
 
 def install() -> None:
-    """Makes Numba keep and inline the code of this process so."""
+    """Makes Numba compile so in this process."""
     worker: Any = InlineWorker
     worker.inline_function = _inline_function
+    arrays: Any = arrayobj
+    arrays.raise_with_shape_context = _refuse
     codegen: Any = cpu_target.target_context.codegen()
     codegen._library_class = DeferredLibrary
     codegen.set_env = _set_env.__get__(codegen)
@@ -129,3 +143,15 @@ def _owned(blocks: list[Block]) -> Iterator[None]:
     finally:
         for block in blocks:
             block.__class__ = Block
+
+
+def _refuse(given: Any, place: Any) -> Any:  # noqa: ANN401  (shapes, or their types)
+    raise NotImplementedError
+
+
+@overload(_refuse)
+def _refuse_compiled(given: Any, place: Any) -> Any:  # noqa: ANN401, ARG001
+    def refuse(given: Any, place: Any) -> Any:  # noqa: ANN401, ARG001
+        raise ValueError("a slice is assigned one of a different size")
+
+    return refuse

@@ -37,6 +37,7 @@ class SourceHashLocator(_CacheLocator):
         self._hash = loop_hash(module)
         self._folder = cache_folder() / f"{module}-{self._hash}"
         self._line = function.__code__.co_firstlineno
+        self._py_file = str(file)  # Numba names it in its warning of a loop that cannot be cached
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> SourceHashLocator | None:

@@ -2,6 +2,9 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
+from sim.collision import ContactArrays
 from sim.core import Floats, Ints
 
 
@@ -37,3 +40,17 @@ class Sensitivity(NamedTuple):
     contact: Floats  # (n_ligaments,) of the contact stiffness alone
     corner: Floats  # (n_vertices, 2) by the arms of all vertices
     centroid: Floats  # (n_units, 2) by the centroids
+
+
+def no_sensitivity(net: NetworkArrays, contacts: ContactArrays) -> Sensitivity:
+    """Makes zeros to add derivatives to."""
+    return Sensitivity(
+        arm=np.zeros_like(net.arm),
+        vector=np.zeros_like(net.vector),
+        void=np.zeros_like(net.void),
+        law=np.zeros_like(net.law),
+        natural=np.zeros_like(net.natural),
+        contact=np.zeros(len(net.contact)),
+        corner=np.zeros_like(contacts.corner),
+        centroid=np.zeros_like(contacts.centroid),
+    )

@@ -7,9 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.collision import pairs_in_contact, raise_new_pairs
-from sim.core import Floats, Ints, NewContactPairs, compiled
+from sim.collision import raise_new_pairs
+from sim.core import Floats, Ints, NewContactPairs, call_at, compiled
 from sim.energy.connectivity import Topology
+from sim.energy.contact_calls import PAIRS
 from sim.energy.ligament import LigamentStrain, ligament_strain
 from sim.energy.system import System, kinematics_of, system_of
 from sim.energy.total import gradient
@@ -49,7 +50,8 @@ def _visit(states: Floats, system: System, energies: Floats, forces: Floats, pai
     kinematics = kinematics_of(system)
     for n in range(len(states)):
         energies[n] = gradient(states[n], system, kinematics, forces[n])
-        pairs[n] = pairs_in_contact(states[n], system.contacts)
+        if len(system.contacts.pairs) > 0:
+            pairs[n] = call_at(system.calls[PAIRS], 0, (states[n], system.contacts))
 
 
 def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> Observables:

@@ -7,7 +7,8 @@ import numpy as np
 from sim.collision import ContactArrays, contact_arrays
 from sim.core import Floats, Ints, compiled
 from sim.energy.connectivity import Topology
-from sim.energy.network_arrays import Kinematics, NetworkArrays, Sensitivity
+from sim.energy.contact_calls import contact_calls
+from sim.energy.network_arrays import Kinematics, NetworkArrays, Sensitivity, no_sensitivity
 from sim.linalg import Matrix, Pattern, matrix
 from sim.structure import ConcreteParameters
 
@@ -17,6 +18,7 @@ class System(NamedTuple):
 
     net: NetworkArrays  # ligaments, and contact on their void angles
     contacts: ContactArrays  # contact on the distance of units
+    calls: Ints  # (6,) addresses of its kernels
     mass: Floats  # (n_dofs,) diagonal
     damping: Floats  # (n_dofs,) diagonal
     free: Ints  # (n_dofs,) number of each dof among the free ones, negative where held
@@ -79,9 +81,12 @@ def system_of(
     """Lays out the system of parameters, with contact in ``touching`` ligaments (default all)."""
     free, pattern = topology.numbering
     loads = np.ones(3 * len(topology.loaded))  # of no mass that counts
+    net = topology.network(values, touching)
+    contacts = contact_arrays(topology.contact, values, topology.n_dofs // 3)
     return System(
-        net=topology.network(values, touching),
-        contacts=contact_arrays(topology.contact, values, topology.n_dofs // 3),
+        net=net,
+        contacts=contacts,
+        calls=contact_calls(net, contacts, pattern),
         mass=np.concatenate([np.ravel(values.mass), loads]),
         damping=np.concatenate([np.ravel(values.damping), 0.0 * loads]),
         free=free,
@@ -95,18 +100,8 @@ def system_of(
 
 def empty_bars(system: System, drive_shape: tuple[int, ...]) -> Bars:
     """Zeros to add derivatives to."""
-    net = system.net
-    sensitivity = Sensitivity(
-        arm=np.zeros_like(net.arm),
-        vector=np.zeros_like(net.vector),
-        void=np.zeros_like(net.void),
-        law=np.zeros_like(net.law),
-        natural=np.zeros_like(net.natural),
-        contact=np.zeros(len(net.contact)),
-        corner=np.zeros_like(system.contacts.corner),
-        centroid=np.zeros_like(system.contacts.centroid),
-    )
     zero = np.zeros_like(system.mass)
+    sensitivity = no_sensitivity(system.net, system.contacts)
     return Bars(sensitivity, zero, zero.copy(), np.zeros(drive_shape))
 
 

@@ -7,15 +7,9 @@ The solvers see the energy and the admissible states through these functions alo
 derivatives read the kinematics that `gradient` or `locate` left of the same state.
 """
 
-from sim.collision import collision_free_step
-from sim.core import Floats, Ints, compiled
+from sim.core import Floats, Ints, call_at, compiled
 from sim.energy import ligament_kernels, void_contact_kernels
-from sim.energy.distance_contact_kernels import (
-    add_gradient,
-    add_hessian_product,
-    add_mixed,
-    add_tangent,
-)
+from sim.energy.contact_calls import FREE_STEP, GRADIENT, HESSIAN_PRODUCT, MIXED, TANGENT
 from sim.energy.network_arrays import Kinematics, Sensitivity
 from sim.energy.system import System
 from sim.linalg import Matrix
@@ -41,7 +35,7 @@ def gradient(
     strain = ligament_kernels.gradient(motion, system.net, kinematics, out)
     contact = void_contact_kernels.add_gradient(motion, system.net, out)
     if len(system.contacts.pairs) > 0:
-        contact += add_gradient(motion, system.contacts, out)
+        contact += call_at(system.calls[GRADIENT], 0.0, (motion, system.contacts, out))
     first = len(out) - 3 * len(system.loaded)
     for k in range(len(system.loaded)):
         for m in range(3):
@@ -57,7 +51,8 @@ def tangent(motion: Floats, system: System, kinematics: Kinematics, matrix: Matr
     ligament_kernels.tangent(motion, system.net, kinematics, system.free, matrix)
     void_contact_kernels.add_tangent(motion, system.net, system.free, matrix)
     if len(system.contacts.pairs) > 0:
-        add_tangent(motion, system.contacts, system.free, matrix)
+        given = (motion, system.contacts, system.free, matrix)
+        call_at(system.calls[TANGENT], None, given)
 
 
 @compiled
@@ -68,7 +63,8 @@ def hessian_product(
     ligament_kernels.hessian_product(motion, system.net, kinematics, direction, out)
     void_contact_kernels.add_hessian_product(motion, system.net, direction, out)
     if len(system.contacts.pairs) > 0:
-        add_hessian_product(motion, system.contacts, direction, out)
+        given = (motion, system.contacts, direction, out)
+        call_at(system.calls[HESSIAN_PRODUCT], None, given)
     first = len(out) - 3 * len(system.loaded)
     for k in range(len(system.loaded)):
         for m in range(3):
@@ -86,7 +82,8 @@ def mixed(
     ligament_kernels.mixed(motion, system.net, kinematics, direction, which, out)
     void_contact_kernels.add_mixed(motion, system.net, direction, which, out)
     if len(system.contacts.pairs) > 0:
-        add_mixed(motion, system.contacts, kinematics.turn, direction, out)
+        given = (motion, system.contacts, kinematics.turn, direction, out)
+        call_at(system.calls[MIXED], None, given)
 
 
 @compiled
@@ -94,5 +91,6 @@ def admissible_step(motion: Floats, system: System, step: Floats) -> float:
     """Largest multiple of ``step`` (n_dofs,) up to which all states are admissible."""
     largest = void_contact_kernels.barrier_step(motion, system.net, step)
     if len(system.contacts.pairs) > 0:
-        largest = min(largest, collision_free_step(motion, system.contacts, step))
+        free = call_at(system.calls[FREE_STEP], 0.0, (motion, system.contacts, step))
+        largest = min(largest, free)
     return largest
