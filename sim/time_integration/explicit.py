@@ -81,7 +81,7 @@ class ExplicitSolver:
             outputs = self._outputs(steps.n_steps)
             failed = run(steps, outputs, system, self._watched, checkpoints, u, v)
             raise_new_pairs(system.contacts)
-            needed = 2 * stable if failed >= 0 else self._steps_in_motion(values, u)
+            needed = 2 * stable if failed >= 0 else self._steps_in_motion(values, u, stable)
             if needed <= stable:
                 return u, v, ExplicitRecord(steps, checkpoints, top)
             stable = needed
@@ -109,14 +109,20 @@ class ExplicitSolver:
         rung = np.ceil(np.log(max(needed / self.n_steps, 1.0)) / np.log(RUNG))
         return int(np.ceil(self.n_steps * RUNG**rung))
 
-    def _steps_in_motion(self, values: ConcreteParameters, states: Floats) -> int:
-        """Counts the steps that are stable in the one of the states whose energy is greatest."""
+    def _steps_in_motion(self, values: ConcreteParameters, states: Floats, taken: int) -> int:
+        """Counts the steps that are stable in the one of the states whose energy is greatest.
+
+        They are twice those `taken` if units overlap in a state, which may lie between two steps.
+        """
         seen = observe(
             self.topology,
             values,
             states[:, : 3 * self.topology.n_units].reshape(len(states), -1, 3),
         )
-        fullest = states[(seen.strain_energy + seen.contact_energy).argmax()]
+        energy = seen.strain_energy + seen.contact_energy
+        if not np.isfinite(energy).all():
+            return 2 * taken
+        fullest = states[energy.argmax()]
         return self._steps_for(highest_frequency(self.topology, values, fullest, NONE))
 
     @property

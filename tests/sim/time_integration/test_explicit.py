@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.scenes import BARRIER, CUTOFF
 from sim.core import Floats, SimulationError
-from sim.energy import hessian_product, locate, system_of, workspace
+from sim.energy import hessian_product, locate, observe, system_of, workspace
 from sim.solvers import Harmonic, solve_case
 from sim.time_integration import BLANES_MOAN, LEAPFROG, ExplicitSolver, ImplicitSolver, Splitting
 from sim.vibration import highest_frequency, lowest_frequency
@@ -72,6 +72,17 @@ def test_a_step_beyond_the_stability_limit_is_cut() -> None:
         rig.values, rig.drive
     )[0]
     np.testing.assert_allclose(u, fine, atol=2e-2 * np.abs(fine).max())
+
+
+def test_units_overlap_in_no_output_between_two_steps() -> None:
+    """The interpolated state of a hard collision may be where no unit can be."""
+    rig = shaken(5.3, distance=0.2)
+    solver = ExplicitSolver(rig.topology, 0.03, 900, np.linspace(0.0, 0.03, 6001))
+    u, _, record = solve_case(solver, rig.values, rig.drive)
+    seen = observe(rig.topology, rig.values, u.reshape(len(u), -1, 3))
+    assert np.isfinite(seen.contact_energy).all()
+    assert seen.contact_energy.max() > 0.0
+    assert record.steps.n_steps > 1800  # so many let units overlap at an output
 
 
 @SPLITTINGS
