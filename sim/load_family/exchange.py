@@ -43,13 +43,17 @@ class FamilyOptions:
     search: SearchOptions = field(default_factory=SearchOptions)  # of the worst load
 
 
-class _Search:
-    """Searches the worst loads for designs; a journal remembers all losses that it computes."""
+class LoadSearch:
+    """Searches the worst loads for designs; a journal remembers all losses that it computes.
+
+    Each search looks at other places, so that loads which one has missed are found by the next.
+    """
 
     def __init__(
         self, losses: LoadLosses, wrap: Callable[[Evaluate], Evaluate], options: SearchOptions
     ) -> None:
-        size, self._family, self._options = losses.family.size, losses.family, options
+        size, self._family, self._searches = losses.family.size, losses.family, 0
+        self._options = options
 
         def value(joined: Floats) -> tuple[float, Floats, Floats]:
             return losses.value(joined[:-size], joined[-size:]), np.zeros(0), np.zeros(0)
@@ -69,7 +73,9 @@ class _Search:
         def loss(place: Floats) -> tuple[float, Floats]:
             return self._loss(np.concatenate([design, place]))[:2]
 
-        return search_worst(value, loss, self._family, self._options, known)
+        options = replace(self._options, seed=self._options.seed + self._searches)
+        self._searches += 1
+        return search_worst(value, loss, self._family, options, known)
 
 
 class LoadSet:
@@ -164,7 +170,7 @@ def minimise_worst(
     losses = LoadLosses(scene, without_copies(family, scene), *parameters_of_copies(scene))
     held = LoadSet(losses, scene, options)
     wrap: Callable[[Evaluate], Evaluate] = (lambda f: f) if journal is None else journal.wrap
-    search, evaluate = _Search(losses, wrap, options.search), wrap(held)
+    search, evaluate = LoadSearch(losses, wrap, options.search), wrap(held)
     constraints = constraints_of(scene, make_plan(scene), limits)
     x = np.zeros(scene.space.n_variables) if start is None else start
     history: list[Evaluation] = []

@@ -19,10 +19,10 @@ APART = 0.02
 class SearchOptions:
     """Holds how the worst load is searched."""
 
-    samples: int = 16  # loads spread over the family, of which the losses alone are computed
+    samples: int = 16  # loads spread over each set-up, of which the losses alone are computed
     ascents: int = 3  # searches by the gradient, from the worst of these
     evaluations: int = 8  # ... of so many losses with their gradient each, at most.
-    seed: int = 0  # of the samples
+    seed: int = 0  # of the samples of the first search
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,8 @@ def search_worst(
         options: of the search.
         known: places to start from besides, if they are among the worst.
     """
-    starts = [*known, *spread_places(family, options.samples, options.seed)]
+    samples = options.samples * len(family.setups)
+    starts = [*known, *spread_places(family, samples, options.seed)]
 
     def tried(place: Floats) -> float:
         try:

@@ -20,7 +20,8 @@ from sim.load_family import (
     minimise_worst,
     spread_places,
 )
-from sim.load_family.exchange import IDLE, LoadSet, without_copies
+from sim.load_family.exchange import IDLE, LoadSearch, LoadSet, without_copies
+from sim.load_family.family_losses import LoadLoss
 from sim.load_family.worst_load import search_worst
 from sim.optimise import Evaluation, Journal, Result, SqpOptions, minimise
 from sim.scene import Clamp, Scene, parameters_of_copies, parameters_of_design, simulate
@@ -166,6 +167,25 @@ def test_the_search_finds_the_highest_of_several_hills() -> None:
     assert len(found) == 3
     assert found[0].loss == pytest.approx(2.0, abs=1e-3)
     np.testing.assert_allclose(found[0].place, [0.8, 0.7], atol=1e-2)
+
+
+def test_a_load_that_one_search_misses_is_found_by_another() -> None:
+    """Beyond a snap, where losses jump, no gradient leads."""
+
+    class Snapping(LoadLosses):
+        def __init__(self) -> None:
+            self.family = PUSHED
+
+        def value(self, _: Floats, place: Floats) -> float:
+            return 2.0 if np.abs(place - [0.2, 0.95]).max() < 0.06 else 1.0
+
+        def __call__(self, _: Floats, place: Floats) -> LoadLoss:
+            return LoadLoss(self.value(_, place), np.zeros(0), np.zeros(2))
+
+    search = LoadSearch(Snapping(), lambda evaluate: evaluate, SearchOptions())
+    found = [search(np.zeros(1))[0].loss for _ in range(8)]
+    assert found[0] == 1.0
+    assert max(found) == 2.0
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1e3])
