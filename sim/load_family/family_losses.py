@@ -74,6 +74,12 @@ class LoadSetup:
             dtype=float,
         )
 
+    @property
+    def varied(self) -> tuple[bool, ...]:
+        """Tells which of the numbers of a load are in ranges, and not single values."""
+        ranges = (self.direction, self.amplitude, self.frequency)
+        return tuple(each[0] < each[1] for each in ranges if each is not None)
+
     def octave(self, place: Floats) -> int:
         """Counts the whole octaves from the highest frequency down to that of a place."""
         if self.frequency is None:
@@ -140,11 +146,17 @@ class LoadFamily:
         return self.centred(np.append(self.setups[0].place(motion), [0.0] * (len(self.setups) > 1)))
 
     def centred(self, places: Floats) -> Floats:
-        """Moves places (..., n) to the middle of their set-up's part, so that equal loads are."""
+        """Moves places (..., n) to the one of equal loads that stands for them.
+
+        It is in the middle of its set-up's part, and at the start of what is a single value.
+        """
+        numbers = self.number(places)
+        varied = np.array([each.varied for each in self.setups])[numbers]
+        inside = np.where(varied, places[..., : self.setups[0].size], 0.0)
         if len(self.setups) == 1:
-            return places
-        middle = (self.number(places) + 0.5) / len(self.setups)
-        return np.concatenate([places[..., :-1], middle[..., None]], axis=-1)
+            return inside
+        middle = (numbers + 0.5) / len(self.setups)
+        return np.concatenate([inside, middle[..., None]], axis=-1)
 
 
 def directed(

@@ -224,6 +224,17 @@ def test_places_are_spread_alike_and_copies_left_out() -> None:
     assert without_copies(SHAKEN, scene()) == SHAKEN
 
 
+def test_equal_loads_have_one_place() -> None:
+    """Of numbers that are single values, and of set-ups."""
+    steady = replace(SHAKING, direction=(0.0, 0.0), amplitude=(3.0, 3.0))
+    places = spread_places(LoadFamily((steady,)), 8, 0)
+    assert (places[:, :2] == 0.0).all()
+    assert len(np.unique(places[:, 2])) == 8
+    both = spread_places(LoadFamily((steady, SHAKING)), 8, 0)
+    assert (both[both[:, 3] == 0.25, :2] == 0.0).all()
+    assert (both[both[:, 3] == 0.75, :2] > 0.0).all()
+
+
 def test_a_load_leaves_the_set_when_it_did_no_harm_for_long() -> None:
     posed = scene(samples=21, accuracy="draft")
     losses = LoadLosses(posed, SHAKEN, parameters_of_design(posed))
