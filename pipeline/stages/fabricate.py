@@ -3,7 +3,7 @@
 import argparse
 import logging
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -23,6 +23,9 @@ from sim.core import SimulationError
 from sim.scene import as_built
 
 LOG = logging.getLogger(__name__)
+
+WORSE = 1.5
+"""Loss as built over that as designed, from which a specimen is another than was simulated."""
 
 
 def work(args: argparse.Namespace) -> None:
@@ -56,6 +59,19 @@ def work(args: argparse.Namespace) -> None:
         thinnest = min(specimen.thin, key=lambda label: specimen.thin[label])
         thin = (args.out_dir, len(specimen.thin), THIN_WALL, specimen.thin[thinnest], thinnest)
         LOG.warning("%s: %d units have walls under %g mm (from %.2f mm, unit %s)", *thin)
+    if (worse := loss_warning(built or {})) is not None:
+        LOG.warning("%s: %s", args.out_dir, worse)
+
+
+def loss_warning(built: Mapping[str, float | str]) -> str | None:
+    """Warns of shims, bent as they are drawn, by which a specimen does worse than designed."""
+    designed, loss = (float(built.get(f"loss_as_{how}", 0.0)) for how in ("designed", "built"))
+    if loss <= WORSE * designed:
+        return None
+    return (
+        f"as built, its shims bent as drawn, the loss is {loss:.3g} for {designed:.3g} as designed;"
+        " ask for optimiser.as_built, or for constraints.straight_shims"
+    )
 
 
 def _as_built(

@@ -8,6 +8,7 @@ from pipeline.__main__ import run_stage
 from pipeline.fabrication.units import end_angles, network
 from pipeline.posing import read_design, scene_of, structures_of
 from pipeline.stages.as_built import bent_warning
+from pipeline.stages.fabricate import loss_warning
 from sim.scene import as_built
 from tests.pipeline import static
 
@@ -62,3 +63,11 @@ def test_shims_bent_beyond_the_law_of_ligaments_are_warned_of() -> None:
     (told,) = bent_warning("cloaked", angles)
     assert "2 of 3 shims of the cloaked structure" in told
     assert "at most by 103°" in told
+
+
+def test_a_specimen_that_does_worse_than_designed_is_told() -> None:
+    for built in ({"loss_as_designed": 0.01, "loss_as_built": 0.012}, {"failure": "none"}):
+        assert loss_warning(built) is None
+    told = loss_warning({"loss_as_designed": 0.01, "loss_as_built": 0.14})
+    assert told is not None
+    assert "the loss is 0.14 for 0.01 as designed; ask for optimiser.as_built" in told
