@@ -69,10 +69,9 @@ from sim.collision import find
 from sim.energy import system_of
 from sim.energy.distance_contact_kernels import add_gradient
 from tests.sim.structures import shaken
-for distance in (None, 0.2):
-    rig = shaken(distance=distance)
-    system = system_of(rig.topology, rig.values)
-    print((system.calls != 0).sum(), len(add_gradient.overloads), len(find.callee.overloads))
+rig = shaken()
+system = system_of(rig.topology, rig.values)
+print((system.calls != 0).sum(), len(add_gradient.overloads), len(find.callee.overloads))
 """
 
 
@@ -80,4 +79,4 @@ def test_a_structure_without_contact_on_distance_compiles_none_of_it(tmp_path: P
     places = {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path)}
     run = [sys.executable, "-c", LAWS]
     told = subprocess.check_output(run, env=os.environ | places, text=True, timeout=300)
-    assert told == "0 0 0\n6 1 1\n"
+    assert told == "0 0 0\n"
