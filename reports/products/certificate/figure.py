@@ -214,7 +214,7 @@ def _distribution(axes: Axes, data: xr.Dataset) -> None:
         axes.plot(of["nominal_worst"], 0.0, "v", color=colour, markersize=4.0, clip_on=False)
     axes.set(xlabel=_label(data), ylabel="share of the loads above (%)", ylim=(0.0, 100.0))
     axes.set_xlim(left=0.0)
-    axes.legend(loc="upper right")
+    axes.legend(loc="best")
 
 
 def _map(figure: Figure, axes: Axes, found: CertifiedDesign) -> None:
