@@ -66,7 +66,7 @@ def work(args: argparse.Namespace) -> None:
 def loss_warning(built: Mapping[str, float | str]) -> str | None:
     """Warns of shims, bent as they are drawn, by which a specimen does worse than designed."""
     designed, loss = (float(built.get(f"loss_as_{how}", 0.0)) for how in ("designed", "built"))
-    if loss <= WORSE * designed:
+    if designed == 0.0 or loss <= WORSE * designed:  # the intact structure has none to compare
         return None
     return (
         f"as built, its shims bent as drawn, the loss is {loss:.3g} for {designed:.3g} as designed;"
