@@ -30,7 +30,7 @@ def work(arguments: list[str]) -> NoReturn:
         _clear_the_ground()
     except UserError as error:
         sys.exit(f"error: {error}")
-    _end_with_parent()
+    _end_with_make()
     snakemake = str(Path(sys.executable).with_name("snakemake"))
     os.execv(snakemake, [snakemake, *_places(), *arguments])
 
@@ -91,7 +91,10 @@ def _mark(process: psutil.Process) -> str:
         return ""
 
 
-def _end_with_parent() -> None:
-    """Asks Linux to kill this process with its parent: a killed `make` leaves no snakemake."""
-    if sys.platform == "linux":
+def _end_with_make() -> None:
+    """Asks Linux to kill this process with the `make` that began it, which then leaves no snakemake.
+
+    Of any other parent nothing is asked: a run that a shell left in the background outlives it.
+    """
+    if "MAKELEVEL" in os.environ and sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)
