@@ -11,7 +11,7 @@ from typing import Any, TypeVar, cast
 from numba import jit, njit
 from numba.core import event
 
-from sim.core import code_library, compile_time, loop_cache
+from sim.core import borrowed_tuples, code_library, compile_time, loop_cache
 from sim.core.code_library import Loop
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -22,6 +22,7 @@ _SECONDS_BETWEEN_LINES = 10.0
 _HOW: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 loop_cache.install()
 code_library.install()
+borrowed_tuples.install()
 
 _WITHIN = RLock()
 _mine: set[str] = set()

@@ -80,5 +80,5 @@ def eigenvalue_and_slopes(
         mixed(moved, system, kinematics, direction, topology.designed, bars.sensitivity)
         hessian_product(moved, system, kinematics, direction, product)
         bar += product
-    adjoint(state[None], bar[None], system, topology.designed, bars)
+    adjoint(state[None], bar[None], system, workspace(system), topology.designed, bars)
     return value, as_values(bars, topology.n_units)

@@ -20,7 +20,6 @@ from sim.energy import (
     hessian_product,
     locate,
     mixed,
-    workspace,
 )
 from sim.quasistatics.newton import (
     INCREMENTS,
@@ -319,21 +318,20 @@ def _repeat(
 
 @compiled
 def follow(
-    loads: Floats, bends: Floats, trusted: Ints, sense: float, system: System, relative: float,
-    absolute: float, drag: Floats, branch: Branch, counts: Ints,
+    loads: Floats, bends: Floats, trusted: Ints, sense: float, system: System, work: Workspace,
+    relative: float, absolute: float, drag: Floats, branch: Branch, counts: Ints,
 ) -> tuple[int, float]:  # fmt: skip
     """Fills a branch with the equilibria at ``loads`` (n_loads, n_held).
 
     `bends` (n_loads, n_dofs) is by how much the path of a similar structure departs from its
     tangent between two loads, to be tried first where `trusted` (n_loads,). The critical mode of a
-    branching is followed in the `sense` 1 or -1. The residual's tolerance is relative to the
+    branching is followed in the `sense` 1 or -1. `work` is room for the states. The residual's tolerance is relative to the
     largest reaction, its floor `absolute` in N; `drag` (n_dofs,) is that of the damped motion after
     a snap; `counts` (4,) gathers the work.
 
     Returns:
         the number of loads reached, and the fraction of the way to the next.
     """
-    work = workspace(system)
     motion, step = np.zeros(len(system.mass)), np.empty(len(system.mass))
     mode = np.empty(len(system.dofs))
     _scatter(mode)
@@ -375,13 +373,14 @@ def follow(
 
 
 @compiled
-def adjoint(states: Floats, bar: Floats, system: System, which: Ints, bars: Bars) -> int:
+def adjoint(
+    states: Floats, bar: Floats, system: System, work: Workspace, which: Ints, bars: Bars
+) -> int:
     """Adds the derivatives of a loss with derivatives ``bar`` (n_loads, n_dofs) by ``states``.
 
     Returns:
         the first load whose tangent is not positive definite, or -1.
     """
-    work = workspace(system)
     counts = np.zeros(4, dtype=np.int64)
     for p in range(len(states)):
         if np.abs(bar[p]).max() == 0.0:

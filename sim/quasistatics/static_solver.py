@@ -8,7 +8,7 @@ import numpy as np
 
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
-from sim.energy import Topology, as_values, empty_bars, system_of
+from sim.energy import Topology, as_values, empty_bars, system_of, workspace
 from sim.quasistatics.equilibrium_path import MOST_SNAPS, Branch, adjoint, follow
 from sim.solvers import PrescribedMotion, check_connected, check_ligaments, check_start
 from sim.structure import ConcreteParameters
@@ -84,8 +84,9 @@ class StaticSolver:
         check_start(top, values, system.contacts, np.zeros(top.n_dofs))
         drag = system.damping if (system.damping[top.free_dofs] > 0).all() else top.scale**2
         reached, fraction = follow(
-            loads, bends, trusted, self.sense, system, self.relative, floor, drag, branch, counts
-        )
+            loads, bends, trusted, self.sense, system, workspace(system), self.relative, floor,
+            drag, branch, counts,
+        )  # fmt: skip
         raise_new_pairs(system.contacts)
         if reached < len(loads):
             raise self._ended(values, branch.states[: reached + 1], fraction)
@@ -152,7 +153,7 @@ class StaticSolver:
         top = record.topology or self.topology
         system = system_of(top, values)
         bars = empty_bars(system, (len(record.states), len(top.held)))
-        unstable = adjoint(record.states, bar_u, system, top.designed, bars)
+        unstable = adjoint(record.states, bar_u, system, workspace(system), top.designed, bars)
         if unstable >= 0:
             raise SimulationError(
                 f"the equilibrium at load {unstable} is not a minimum of the energy, so it has no"

@@ -3,7 +3,7 @@
 import numpy as np
 
 from sim.core import Floats, Ints, compiled, inlined
-from sim.energy import System, Workspace, admissible_step, gradient, workspace
+from sim.energy import System, Workspace, admissible_step, gradient
 from sim.time_integration.esdirk_stage import CONVERGED, Base, solve_stage
 
 
@@ -66,6 +66,7 @@ def march(
     first: int,
     drive: Floats,
     system: System,
+    work: Workspace,
     stages: Floats,
     nodes: Floats,
     tolerance: float,
@@ -81,6 +82,7 @@ def march(
         first: step to begin with; those before it are given.
         drive: (1 + n_steps (n_stages - 1), n_held) prescribed values at the start and all stages.
         system: the structure.
+        work: room for its states, filled.
         stages: coefficients of the method.
         nodes: its stage times.
         tolerance: of the stage velocity, mm/s.
@@ -94,7 +96,6 @@ def march(
         status, step index reached, dof with the largest step left.
     """
     n_steps, n_stages = len(times) - 1, len(nodes)
-    work = workspace(system)
     motion = np.empty(len(system.mass))
     base_u, base_v = np.empty_like(motion), np.empty_like(motion)
     rate, factored_k = 0.1, -1.0

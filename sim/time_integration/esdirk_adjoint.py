@@ -6,7 +6,7 @@ It factors every stage's tangent anew, so that it does not depend on which facto
 import numpy as np
 
 from sim.core import Floats, Ints, compiled, inlined
-from sim.energy import Bars, System, Workspace, hessian_product, locate, mixed, workspace
+from sim.energy import Bars, System, Workspace, hessian_product, locate, mixed
 from sim.linalg import solve
 from sim.time_integration.esdirk_stage import factorise_stage
 
@@ -71,6 +71,7 @@ def adjoint(
     bar_u: Floats,
     bar_v: Floats,
     system: System,
+    work: Workspace,
     stages: Floats,
     which: Ints,
     bars: Bars,
@@ -84,7 +85,6 @@ def adjoint(
         False if a stage's tangent is not positive definite.
     """
     n_steps, n_stages = len(times) - 1, stages.shape[0]
-    work = workspace(system)
     u = np.zeros((n_stages, len(system.mass)))
     v, a = np.zeros_like(u), np.zeros_like(u)
     next_u, next_v = bar_u[n_steps].copy(), bar_v[n_steps].copy()

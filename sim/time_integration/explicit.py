@@ -8,7 +8,7 @@ import numpy as np
 
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
-from sim.energy import System, Topology, as_values, empty_bars, observe, system_of
+from sim.energy import System, Topology, as_values, empty_bars, observe, system_of, workspace
 from sim.solvers import PrescribedMotion, check_masses, check_start
 from sim.structure import ConcreteParameters, VoidAngleContact
 from sim.time_integration import time_grid
@@ -79,7 +79,9 @@ class ExplicitSolver:
             checkpoints = np.empty((-(-steps.n_steps // steps.segment), 2, top.n_dofs))
             u, v = (np.zeros((len(self.output_times), top.n_dofs)) for _ in range(2))
             outputs = self._outputs(steps.n_steps)
-            failed = run(steps, outputs, system, self._watched, checkpoints, u, v)
+            failed = run(
+                steps, outputs, system, workspace(system), self._watched, checkpoints, u, v
+            )
             raise_new_pairs(system.contacts)
             needed = 2 * stable if failed >= 0 else self._steps_in_motion(values, u, stable)
             if needed <= stable:
@@ -141,8 +143,8 @@ class ExplicitSolver:
         bar_decay, bar_gain = np.zeros_like(steps.decay), np.zeros_like(steps.gain)
         outputs = self._outputs(steps.n_steps)
         sweep_back(
-            steps, outputs, system, self._watched, record.checkpoints, bar_u, bar_v, top.designed,
-            bars, bar_decay, bar_gain,
+            steps, outputs, system, workspace(system), self._watched, record.checkpoints, bar_u,
+            bar_v, top.designed, bars, bar_decay, bar_gain,
         )  # fmt: skip
         lengths = self.splitting.kicks * steps.h
         by_mass, by_damping = _kicks_transposed(system, lengths, steps, bar_decay, bar_gain)

@@ -8,7 +8,7 @@ import numpy as np
 
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
-from sim.energy import Topology, as_values, empty_bars, system_of
+from sim.energy import Topology, as_values, empty_bars, system_of, workspace
 from sim.solvers import PrescribedMotion, check_masses, check_start, inadmissible
 from sim.structure import ConcreteParameters, VoidAngleContact
 from sim.time_integration import time_grid
@@ -116,8 +116,8 @@ class ImplicitSolver:
         for attempt in range(1, MAX_SPLITS + 1):
             held = drive.values(top.held, time_grid.stage_times(times, tableau.nodes))
             status, step, worst = march(
-                times, step, held, system, tableau.stages, tableau.nodes, self.tolerance, u, v, a,
-                counts,
+                times, step, held, system, workspace(system), tableau.stages, tableau.nodes,
+                self.tolerance, u, v, a, counts,
             )  # fmt: skip
             raise_new_pairs(system.contacts)
             if status == CONVERGED:
@@ -151,6 +151,7 @@ class ImplicitSolver:
             bar_states[:n_times],
             bar_states[n_times:],
             system,
+            workspace(system),
             self.tableau.stages,
             top.designed,
             bars,

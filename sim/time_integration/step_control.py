@@ -6,7 +6,7 @@ import numpy as np
 
 from sim.collision import raise_new_pairs
 from sim.core import Floats, NewContactPairs, SimulationError
-from sim.energy import system_of
+from sim.energy import system_of, workspace
 from sim.solvers import PrescribedMotion
 from sim.structure import ConcreteParameters
 from sim.time_integration import time_grid
@@ -99,8 +99,9 @@ def _attempt(
     held = drive.values(top.held, time_grid.stage_times(times, tableau.nodes))
     system, counts = system_of(top, values), np.zeros(3, dtype=np.int64)
     status, _, _ = march(
-        times, 0, held, system, tableau.stages, tableau.nodes, solver.tolerance, u, v, a, counts
-    )
+        times, 0, held, system, workspace(system), tableau.stages, tableau.nodes, solver.tolerance,
+        u, v, a, counts,
+    )  # fmt: skip
     raise_new_pairs(system.contacts)
     if status != CONVERGED:
         return None, np.inf

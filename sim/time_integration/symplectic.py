@@ -23,7 +23,6 @@ from sim.energy import (
     gradient,
     hessian_product,
     mixed,
-    workspace,
 )
 from sim.time_integration.contact_substeps import Flight, Pace, flight_of, fly, fly_back
 
@@ -113,6 +112,7 @@ def run(
     steps: Steps,
     outputs: Outputs,
     system: System,
+    work: Workspace,
     watched: Ints,
     checkpoints: Floats,
     out_u: Floats,
@@ -127,7 +127,7 @@ def run(
         the step at which the motion left the admissible states, or -1.
     """
     n_dofs = steps.gain.shape[1]
-    work, flight = workspace(system), flight_of(watched, n_dofs // 3)
+    flight = flight_of(watched, n_dofs // 3)
     trace = _trace(1, steps, system)
     u, v = np.zeros(n_dofs), np.zeros(n_dofs)
     last_u, last_v = np.zeros(n_dofs), np.zeros(n_dofs)
@@ -210,9 +210,9 @@ def _step_back(
 
 @compiled
 def sweep_back(
-    steps: Steps, outputs: Outputs, system: System, watched: Ints, checkpoints: Floats,
-    out_bar_u: Floats, out_bar_v: Floats, which: Ints, bars: Bars, bar_decay: Floats,
-    bar_gain: Floats,
+    steps: Steps, outputs: Outputs, system: System, work: Workspace, watched: Ints,
+    checkpoints: Floats, out_bar_u: Floats, out_bar_v: Floats, which: Ints, bars: Bars,
+    bar_decay: Floats, bar_gain: Floats,
 ) -> None:  # fmt: skip
     """Reverse sweep of ``run`` from the loss derivatives by its outputs (n_times, n_dofs).
 
@@ -220,7 +220,7 @@ def sweep_back(
     ``bar_decay`` and ``bar_gain``.
     """
     n_dofs = steps.gain.shape[1]
-    work, flight = workspace(system), flight_of(watched, n_dofs // 3)
+    flight = flight_of(watched, n_dofs // 3)
     trace = _trace(steps.segment, steps, system)
     u, v = np.empty(n_dofs), np.empty(n_dofs)
     bar_u, bar_v = np.zeros(n_dofs), np.zeros(n_dofs)
