@@ -8,7 +8,7 @@ loop makes, or gets from one that it calls, need counting there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
 
@@ -50,7 +50,7 @@ def install() -> None:
 
 def counted_tuples(function: Any) -> Kinds | None:  # noqa: ANN401  (a Lower of Numba)
     """Finds the types of tuples that a function may own, parts of them included; None: all."""
-    if not Path(function.func_ir.loc.filename).is_relative_to(ROOT):
+    if not _is_ours(Path(function.func_ir.loc.filename)):
         return None
     kinds: dict[str, types.Type] = function.fndesc.typemap
     if any(map(_keeps, kinds.values())):
@@ -61,9 +61,13 @@ def counted_tuples(function: Any) -> Kinds | None:  # noqa: ANN401  (a Lower of 
         for assignment in block.find_insts(ir.Assign)
         if not _borrows(assignment.value)
     ]
-    arrays = any(not isinstance(kind, types.BaseTuple) and holds_arrays(kind) for kind, _ in made)
+    arrays = any(not isinstance(kind, types.BaseTuple) and _holds_arrays(kind) for kind, _ in made)
     owned = [kind for kind, value in made if arrays or not _gathers(value, kinds)]
     return frozenset(part for kind in (*owned, function.fndesc.restype) for part in _parts(kind))
+
+
+def _is_ours(file: Path) -> bool:
+    return file.is_relative_to(ROOT) and "site-packages" not in file.relative_to(ROOT).parts
 
 
 def _keeps(kind: types.Type) -> bool:
@@ -83,20 +87,25 @@ def _gathers(value: Any, kinds: dict[str, types.Type]) -> bool:  # noqa: ANN401
     """Tells whether an expression puts a tuple together of what there is."""
     if not isinstance(value, ir.Expr):
         return False
-    made_by: Callable[[str], bool] = lambda name: isinstance(kinds[name], types.NamedTupleClass)  # noqa: E731
-    return value.op == "build_tuple" or (value.op == "call" and made_by(value.func.name))
+    if value.op == "call":
+        return isinstance(kinds[value.func.name], types.NamedTupleClass)
+    return bool(value.op == "build_tuple")
 
 
 def _parts(kind: types.Type) -> Iterator[types.Type]:
     """Lists the tuples in a type, itself included."""
     if isinstance(kind, types.BaseTuple):
         yield kind
-        for part in kind:
+        for part in _fields(kind):
             yield from _parts(part)
 
 
-def holds_arrays(kind: types.Type) -> bool:
+def _holds_arrays(kind: types.Type) -> bool:
     """Tells whether values of a type hold references to arrays."""
     if isinstance(kind, types.BaseTuple):
-        return any(map(holds_arrays, kind))
+        return any(map(_holds_arrays, _fields(kind)))
     return isinstance(kind, types.Array)
+
+
+def _fields(kind: types.BaseTuple) -> tuple[types.Type, ...]:
+    return tuple(cast(Any, kind))

@@ -325,9 +325,9 @@ def follow(
 
     `bends` (n_loads, n_dofs) is by how much the path of a similar structure departs from its
     tangent between two loads, to be tried first where `trusted` (n_loads,). The critical mode of a
-    branching is followed in the `sense` 1 or -1. `work` is room for the states. The residual's tolerance is relative to the
-    largest reaction, its floor `absolute` in N; `drag` (n_dofs,) is that of the damped motion after
-    a snap; `counts` (4,) gathers the work.
+    branching is followed in the `sense` 1 or -1. `work` is room for the states. The residual's
+    tolerance is relative to the largest reaction, its floor `absolute` in N; `drag` (n_dofs,) is
+    that of the damped motion after a snap; `counts` (4,) gathers the work.
 
     Returns:
         the number of loads reached, and the fraction of the way to the next.

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar, cast
 
 import jax
 import jax.numpy as jnp
@@ -20,7 +20,7 @@ from jax.custom_derivatives import SymbolicZero
 
 from sim.core import Floats, Ints, NewContactPairs, Numbers
 from sim.energy import Topology
-from sim.solvers.loads import FORCE, MotionLaw, held_values, loaded_units
+from sim.solvers.loads import FORCE, MotionLaw, held_selection, held_values, loaded_units, selected
 from sim.solvers.validation import check_free_dofs, check_masses, check_parameters
 from sim.structure import ConcreteParameters, Parameters
 
@@ -364,19 +364,31 @@ def _drive_cotangent(
     `times` are those of the solver's stages and of the output, `bars` derivatives by the held
     values at both, and by their rates at the output.
     """
-    within, outputs = (jnp.asarray(at) for at in times)
-    units, control = np.asarray(drive.units), drive.control
-
-    def prescribed(motion: MotionLaw) -> tuple[Numbers, ...]:
-        followed = (motion(within), motion(outputs), _rates(motion, outputs))
-        return tuple(held_values(held, units, each, control) for each in followed)
-
-    _, pull_back = jax.vjp(prescribed, drive.motion)
+    control = drive.control
+    selection = held_selection(held, np.asarray(drive.units), control)
     return PrescribedMotion(
         _zero(drive.units),
-        pull_back(tuple(jnp.asarray(bar) for bar in bars))[0],
+        _pull_back(drive.motion, times, selection, bars),
         None if control is None else _zero(control),
     )
+
+
+@jax.jit
+def _pull_back(
+    motion: MotionLaw,
+    times: tuple[Array, Array],
+    selection: Array,
+    bars: tuple[Array, Array, Array],
+) -> MotionLaw:
+    """Compiled once for all drives of a kind: eager derivatives are compiled at every call."""
+    within, outputs = times
+
+    def prescribed(law: MotionLaw) -> tuple[Numbers, ...]:
+        followed = (law(within), law(outputs), _rates(law, outputs))
+        return tuple(selected(selection, each) for each in followed)
+
+    _, pull_back = jax.vjp(prescribed, motion)
+    return cast(MotionLaw, pull_back(bars)[0])
 
 
 def _spread(work: Callable[[T], R], items: Sequence[T], threads: int) -> list[R]:

@@ -208,6 +208,15 @@ def held_values(held: Ints, driven: Ints, motion: Numbers, control: Ints | None 
     Raises:
         ValueError: a driven dof is not among the held ones.
     """
+    return selected(held_selection(held, driven, control), motion)
+
+
+def held_selection(held: Ints, driven: Ints, control: Ints | None = None) -> Floats:
+    """Tells by ones which held dof (n_held) each component of the driven units (3 n_driven) is.
+
+    Raises:
+        ValueError: a driven dof is not among the held ones.
+    """
     units = np.asarray(driven)
     dofs = 3 * units[:, None] + np.arange(3)
     kinds = np.full(dofs.shape, DISPLACEMENT) if control is None else np.asarray(control)
@@ -218,12 +227,18 @@ def held_values(held: Ints, driven: Ints, motion: Numbers, control: Ints | None 
     if not found[kinds == DISPLACEMENT].all():
         raise ValueError("every dof of a driven unit must be held")
     load = first + 3 * np.searchsorted(loaded, units)[:, None] + np.arange(3)
-    if motion.ndim == 2:
-        xp = motion.__array_namespace__()
-        motion = xp.broadcast_to(motion[:, None, :], (len(motion), len(units), 3))
     selection, acts = np.zeros((dofs.size, len(held))), (kinds != FREE).ravel()
     columns = np.where(kinds == FORCE, load, place).ravel()
     selection[np.flatnonzero(acts), columns[acts]] = 1.0
+    return selection
+
+
+def selected(selection: Numbers, motion: Numbers) -> Numbers:
+    """Values (n_times, n_held) of the held dofs by their selection and a motion, as above."""
+    if motion.ndim == 2:
+        xp = motion.__array_namespace__()
+        each = (len(motion), selection.shape[0] // 3, 3)
+        motion = xp.broadcast_to(motion[:, None, :], each)
     return motion.reshape(len(motion), -1) @ selection
 
 

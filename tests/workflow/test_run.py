@@ -78,6 +78,7 @@ def test_a_run_in_the_background_outlives_its_shell_and_not_its_make(sandbox: Sa
             ["sh", "-c", f"'{sys.executable}' -m pipeline run {DESIGN} & read line"],
             cwd=sandbox.root,
             env=environment,
+            text=True,
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

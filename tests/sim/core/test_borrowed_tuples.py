@@ -2,11 +2,11 @@
 
 import gc
 import sys
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from numba.core.runtime import _nrt_python, rtsys
+from numba.core import runtime
 
 from sim.core import Floats, compiled
 
@@ -77,15 +77,16 @@ def test_tuples_that_are_made_live_as_long_as_they_are_used(nest: Nest) -> None:
 
 
 def test_nothing_stays_behind(nest: Nest) -> None:
-    _nrt_python.memsys_enable_stats()
+    memory: Any = runtime  # without types of its own
+    memory._nrt_python.memsys_enable_stats()
     use_own(nest, 10)
     gc.collect()
-    before = rtsys.get_allocation_stats()
+    before = memory.rtsys.get_allocation_stats()
     for _ in range(20):
         use_own(nest, 10)
         made = make(5)
         assert made.pair.second.sum() == 10.0
     del made
     gc.collect()
-    after = rtsys.get_allocation_stats()
+    after = memory.rtsys.get_allocation_stats()
     assert after.alloc - before.alloc == after.free - before.free
