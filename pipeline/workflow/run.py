@@ -92,9 +92,9 @@ def _mark(process: psutil.Process) -> str:
 
 
 def _end_with_make() -> None:
-    """Asks Linux to kill this process with the `make` that began it, which then leaves no snakemake.
+    """Asks Linux to kill this process with the `make` that began it: it leaves no snakemake.
 
-    Of any other parent nothing is asked: a run that a shell left in the background outlives it.
+    A run that a shell left in the background outlives the shell.
     """
     if "MAKELEVEL" in os.environ and sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)
