@@ -380,7 +380,7 @@ def _pull_back(
     selection: Array,
     bars: tuple[Array, Array, Array],
 ) -> MotionLaw:
-    """Compiled once for all drives of a kind: eager derivatives are compiled at every call."""
+    """Pulls derivatives back to a law; compiled once for a kind of drive, eager at every call."""
     within, outputs = times
 
     def prescribed(law: MotionLaw) -> tuple[Numbers, ...]:

@@ -1,4 +1,4 @@
-"""What is not counted is neither kept for ever nor given back while somebody uses it."""
+"""Checks that what is not counted is neither kept for ever nor freed while it is used."""
 
 import gc
 import sys
