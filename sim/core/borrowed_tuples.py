@@ -61,8 +61,9 @@ def counted_tuples(function: Any) -> Kinds | None:  # noqa: ANN401  (a Lower of 
         for assignment in block.find_insts(ir.Assign)
         if not _borrows(assignment.value)
     ]
-    arrays = any(not isinstance(kind, types.BaseTuple) and _holds_arrays(kind) for kind, _ in made)
-    owned = [kind for kind, value in made if arrays or not _gathers(value, kinds)]
+    owned = [kind for kind, value in made if not _gathers(value, kinds)]
+    if any(map(_holds_arrays, owned)):  # which tuples put together of them have to keep
+        owned = [kind for kind, _ in made]
     return frozenset(part for kind in (*owned, function.fndesc.restype) for part in _parts(kind))
 
 

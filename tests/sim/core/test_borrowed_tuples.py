@@ -50,6 +50,25 @@ def use_own(given: Nest, size: int) -> float:
     return float(own.first.sum() + own.second.sum() + part.second.sum() + swapped(made).second[0])
 
 
+class Triple(NamedTuple):
+    first: Floats
+    second: Floats
+    third: Floats
+
+
+@compiled
+def regrouped(size: int) -> float:
+    """Keeps arrays of a tuple that another made in one of its own, which outlives that."""
+    made = make(size)
+    own = Triple(made.third, made.pair.second, made.pair.first)
+    total = 0.0
+    for _ in range(3):
+        other = make(size)  # takes the memory of what has been freed
+        other.third[:] = 100.0
+        total += own.first[size - 1] + own.second[size - 1] + own.third[size - 1]
+    return total
+
+
 @pytest.fixture
 def nest() -> Nest:
     return Nest(Pair(np.array([1.0]), np.array([2.0])), np.array([3.0]))
@@ -74,6 +93,10 @@ def test_tuples_that_are_made_live_as_long_as_they_are_used(nest: Nest) -> None:
     del out
     gc.collect()
     assert counts(nest) == before
+
+
+def test_arrays_that_another_made_live_in_an_own_tuple() -> None:
+    assert regrouped(1000) == 18.0
 
 
 def test_nothing_stays_behind(nest: Nest) -> None:
