@@ -23,7 +23,7 @@ from sim.energy import Topology, observe, topology
 from sim.linalg import number_free_dofs
 from sim.quasistatics import StaticSolver
 from sim.solvers import LinearRamp, PrescribedMotion, held_dofs, solve_case
-from sim.structure import ConcreteParameters, VoidAngleContact, parameters, quads, shape
+from sim.structure import ConcreteParameters, VoidAngleContact, parameters_at, quads
 
 SIDES = (15, 30, 60, 120)
 ALL_IN_BANDS = 60
@@ -90,10 +90,9 @@ def _posed(side: int) -> tuple[Topology, ConcreteParameters, PrescribedMotion]:
     lattice = quads(side, side, 15.0, 2.3, np.deg2rad(20.0))
     left = side * np.arange(side)
     right = left + side - 1
-    made = parameters(lattice, shape(lattice, lattice.vertices), HEAVY)
     posed = topology(lattice, held_dofs(left, right), VoidAngleContact(*np.deg2rad([-15.0, -10.0])))
     drive = PrescribedMotion(right, LinearRamp(-COMPRESSION * side * lattice.spacing, 1.0))
-    return posed, ConcreteParameters(*(np.asarray(part) for part in made)), drive
+    return posed, parameters_at(lattice, lattice.vertices, HEAVY), drive
 
 
 def strict(sides: tuple[int, ...]) -> Run:

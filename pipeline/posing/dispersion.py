@@ -8,7 +8,7 @@ from pipeline.problem import Problem
 from pipeline.problem.sections import Kagome, ListedNetwork, Spectrum
 from pipeline.runtime import UserError
 from sim.core import SimulationError
-from sim.structure import Parameters, parameters, shape
+from sim.structure import parameters_at
 from sim.vibration import UnitCell, bands, brillouin_path, cell_of, strained
 
 
@@ -47,9 +47,8 @@ def _cell(asked: Problem) -> UnitCell:
         what = "a lattice from a file has no unit cell to send waves through"
         raise UserError(what, key="spectrum", remedy="leave the section out")
     lattice = lattice_of(asked)
-    made = parameters(lattice, shape(lattice, lattice.vertices), material_of(asked, lattice))
+    values = parameters_at(lattice, lattice.vertices, material_of(asked, lattice))
     period = (4, 2) if isinstance(asked.lattice, Kagome) else (2, 2)
-    values = Parameters(*(np.asarray(part) for part in made))
     try:
         return cell_of(lattice, contact_laws(asked)["angle"], values, period)
     except ValueError as error:

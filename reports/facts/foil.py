@@ -12,7 +12,7 @@ from reports.facts.fact_records import Fact, facts_of, percent
 from reports.study import display_name
 from sim.core import Floats
 from sim.scene import foil_strains
-from sim.structure import parameters, shape
+from sim.structure import parameters_at
 
 _told = facts_of(__file__)
 
@@ -62,8 +62,8 @@ def largest_strains(problem: Problem, response: xr.Dataset) -> dict[str, Floats]
     for name in (str(name) for name in response["structure"].values):
         part = response.sel(structure=name)
         lattice = lattice_of(problem) if name == "intact" else altered_lattice_of(problem)
-        at_rest = shape(lattice, flat_vertices(lattice, part["vertices"]))
-        values = parameters(lattice, at_rest, material_of(problem, lattice))
+        vertices = flat_vertices(lattice, part["vertices"])
+        values = parameters_at(lattice, vertices, material_of(problem, lattice))
         motion = part["displacement"].transpose("case", "time", "unit", "dof").values
         ends = motion[:, :, lattice.id][:, :, lattice.ligament_units]
         strains = [foil_strains(jnp.asarray(one), values, problem.shim_thickness) for one in ends]

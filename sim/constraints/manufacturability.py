@@ -230,7 +230,7 @@ def worst(
     present = [kind for kind in requirements if len(kind.places)]
     measures, places = tuple(k.measure for k in present), tuple(k.places for k in present)
     for kind, measured in zip(present, _measured(measures, places, at), strict=True):
-        values = np.asarray(kind.margins(measured))
+        values = kind.margins(np.asarray(measured))
         place = int(np.argmin(values))
         if kind.name in found and found[kind.name].value <= values[place]:
             continue

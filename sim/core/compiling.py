@@ -11,7 +11,7 @@ from typing import Any, TypeVar, cast
 from numba import jit, njit
 from numba.core import event
 
-from sim.core import borrowed_tuples, code_library, compile_time, loop_cache
+from sim.core import borrowed_tuples, code_library, compile_time, loop_cache, remembered_types
 from sim.core.code_library import Loop
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -23,6 +23,7 @@ _HOW: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 loop_cache.install()
 code_library.install()
 borrowed_tuples.install()
+remembered_types.install()
 
 _WITHIN = RLock()
 _mine: set[str] = set()

@@ -12,6 +12,7 @@ from sim.core import Floats, Ints, NewContactPairs, call_at, compiled
 from sim.energy.connectivity import Topology
 from sim.energy.contact_calls import PAIRS
 from sim.energy.ligament import LigamentStrain, ligament_strain
+from sim.energy.network_arrays import Kinematics
 from sim.energy.system import System, kinematics_of, system_of
 from sim.energy.total import gradient
 from sim.structure import ConcreteParameters, VoidAngleContact
@@ -46,8 +47,10 @@ class Observables(NamedTuple):
 
 
 @compiled
-def _visit(states: Floats, system: System, energies: Floats, forces: Floats, pairs: Ints) -> None:
-    kinematics = kinematics_of(system)
+def _visit(
+    states: Floats, system: System, kinematics: Kinematics, energies: Floats, forces: Floats,
+    pairs: Ints,
+) -> None:  # fmt: skip
     for n in range(len(states)):
         energies[n] = gradient(states[n], system, kinematics, forces[n])
         if len(system.contacts.pairs) > 0:
@@ -61,7 +64,7 @@ def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> O
     energies, forces = np.empty((len(states), 2)), np.empty_like(states)
     near = np.zeros(len(states), dtype=np.int64)
     system = system_of(topology, values)
-    _visit(states, system, energies, forces, near)
+    _visit(states, system, kinematics_of(system), energies, forces, near)
     try:
         raise_new_pairs(system.contacts)
     except NewContactPairs as met:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.collision import ContactArrays, contact_arrays
-from sim.core import Floats, Ints, compiled
+from sim.core import Floats, Ints
 from sim.energy.connectivity import Topology
 from sim.energy.contact_calls import contact_calls
 from sim.energy.network_arrays import Kinematics, NetworkArrays, Sensitivity, no_sensitivity
@@ -52,27 +52,19 @@ class Bars(NamedTuple):
     drive: Floats  # by the held values, shaped as the sweep takes them
 
 
-@compiled
 def kinematics_of(system: System) -> Kinematics:
-    """Room for the kinematics of a state."""
+    """Allocates room for the kinematics of a state."""
     return Kinematics(np.empty((len(system.mass) // 3, 4)), np.empty(len(system.net.unit)))
 
 
-@compiled
 def workspace(system: System) -> Workspace:
-    """Scratch arrays that fit a system."""
-    n_dofs, n_free = len(system.mass), len(system.dofs)
+    """Allocates scratch arrays that fit a system."""
+    force, step, product, trial, saved, guess = np.empty((6, len(system.mass)))
+    right = np.empty(len(system.dofs))
     return Workspace(
-        kinematics_of(system),
-        np.empty(n_dofs),
-        np.empty(n_dofs),
-        np.empty(n_dofs),
-        np.empty(n_dofs),
-        np.empty(n_dofs),
-        np.empty(n_dofs),
-        np.empty(n_free),
+        kinematics_of(system), force, step, product, trial, saved, guess, right,
         matrix(system.pattern),
-    )
+    )  # fmt: skip
 
 
 def system_of(

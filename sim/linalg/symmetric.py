@@ -105,7 +105,6 @@ def _in_fronts(site: Floats, pairs: Ints, held: Ints) -> tuple[Ints, Pattern]:
     return free, Pattern(np.array([len(dofs), -1]), fronts)
 
 
-@compiled
 def matrix(pattern: Pattern) -> Matrix:
     """Allocates a matrix of that pattern, not yet cleared."""
     n, width = pattern.size

@@ -83,7 +83,7 @@ class Branch(NamedTuple):
     eigenvalue: Floats  # (n_loads,) smallest of the tangent, rotations times scale, N/mm
 
 
-@inlined
+@compiled
 def _tangent_step(motion: Floats, system: System, work: Workspace) -> None:
     """Fills ``work.step`` with that of the path for the held dofs' part in ``work.product``."""
     # K_ff du_f = -K_fh du_h
@@ -112,7 +112,7 @@ def _length(step: Floats, dofs: Ints, system: System) -> float:
     return np.sqrt(total)
 
 
-@inlined
+@compiled
 def _settle(
     motion: Floats, relative: float, absolute: float, system: System, work: Workspace, counts: Ints
 ) -> bool:  # fmt: skip
@@ -124,7 +124,7 @@ def _settle(
     return found and factorise_tangent(motion, system, work, 0.0, counts)
 
 
-@inlined
+@compiled
 def _crooked(motion: Floats, predicted: Floats, system: System, work: Workspace) -> float:
     """Compares the way from ``work.saved`` with the trapezoidal rule; 1 is the most there may be.
 
@@ -205,7 +205,7 @@ def _ahead(increment: float, left: float, way: float, pace: Floats) -> float:
     return min(increment, left, max(expected / way, CLOSE))
 
 
-@inlined
+@compiled
 def _step_ahead(
     motion: Floats, load: Floats, share: float, predicted: Floats, system: System, work: Workspace
 ) -> float:
@@ -234,7 +234,7 @@ def _note(snaps: Floats, place: float) -> None:
             break
 
 
-@inlined
+@compiled
 def _advance(
     motion: Floats, load: Floats, number: int, sense: float, pace: Floats, mode: Floats,
     predicted: Floats, drag: Floats, relative: float, absolute: float, system: System,
@@ -293,7 +293,7 @@ def _advance(
     return done, kind, ended
 
 
-@inlined
+@compiled
 def _repeat(
     motion: Floats, load: Floats, step: Floats, relative: float, absolute: float, system: System,
     work: Workspace, counts: Ints,

@@ -27,7 +27,7 @@ GRADIENTS, FACTORS, SHIFTED, INCREMENTS = 0, 1, 2, 3
 """Places in the counts that the solvers gather."""
 
 
-@inlined
+@compiled
 def balance(motion: Floats, system: System, work: Workspace) -> tuple[float, float, float]:
     """Energy, and the largest out-of-balance and reaction force (moments over the scale), N."""
     strain, contact = gradient(motion, system, work.kinematics, work.force)
@@ -54,7 +54,7 @@ def factorise_tangent(
     return factorise(work.matrix)
 
 
-@inlined
+@compiled
 def _factorise(
     motion: Floats, system: System, work: Workspace, first: float, counts: Ints
 ) -> float:
@@ -85,7 +85,7 @@ def _first_shift(system: System) -> float:
     return FIRST_SHIFT * float(np.median(system.net.law[:, 0]))
 
 
-@inlined
+@compiled
 def solve_free(system: System, work: Workspace) -> None:
     """Fills ``work.step`` with what takes the force off the free dofs, by the tangent's factor."""
     for i in range(len(system.dofs)):
@@ -97,7 +97,7 @@ def solve_free(system: System, work: Workspace) -> None:
         work.step[system.dofs[i]] = work.right[i]
 
 
-@inlined
+@compiled
 def _descend(
     motion: Floats, energy: float, residual: float, newton: bool, system: System, work: Workspace,
     counts: Ints,

@@ -4,8 +4,10 @@ Beyond its barrier a void has no force, and a unit without mass no acceleration:
 on from there without a sign that anything is wrong.
 """
 
+from typing import Any
+
+import jax
 import numpy as np
-from jax.flatten_util import ravel_pytree
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -27,10 +29,12 @@ COLLAPSED = 1e-3
 
 def check_parameters(values: ConcreteParameters, motion: MotionLaw) -> None:
     """Raises an error that names what is not finite, or negative where that has no meaning."""
-    parts = {f"{name} of the structure": part for name, part in values._asdict().items()}
-    parts["motion of the driven units"] = ravel_pytree(motion)[0]
+    parts: dict[str, Any] = {
+        f"{name} of the structure": part for name, part in values._asdict().items()
+    }
+    parts["motion of the driven units"] = jax.tree.leaves(motion)
     for name, part in parts.items():
-        if not np.isfinite(part).all():
+        if not all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(part)):
             raise SimulationError(
                 f"the {name} is not everywhere a finite number; try another design (no unit without"
                 " area, no edge without length) or mend the series that drives it"

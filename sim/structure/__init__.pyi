@@ -32,6 +32,7 @@ from .material import unrotated_inertia as unrotated_inertia
 from .parametrisation import ConcreteParameters as ConcreteParameters
 from .parametrisation import Parameters as Parameters
 from .parametrisation import parameters as parameters
+from .parametrisation import parameters_at as parameters_at
 from .perturbation import MOST_ROUNDS as MOST_ROUNDS
 from .perturbation import Copies as Copies
 from .perturbation import Perturbation as Perturbation

@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.sparse as sp
@@ -61,10 +62,9 @@ class DesignSpace:
 
     def vertices(self, design: Numbers) -> Array:
         """Returns the vertices (n_vertices, 2) of a design vector (n_variables,), mm."""
-        shifting = jnp.asarray(design)[: self.basis.shape[1]]
+        start, shifting = self.lattice.vertices, jnp.asarray(design)[: self.basis.shape[1]]
         free_shifts = _product(self.basis, shifting).reshape(-1, 2)
-        shifts = jnp.zeros((self.lattice.n_groups, 2)).at[self.groups].set(free_shifts)
-        return jnp.asarray(self.lattice.vertices) + shifts[self.lattice.group]
+        return _shifted(start, self.lattice.group, self.groups, free_shifts)
 
     def end_angles(self, design: Numbers) -> Array:
         """Returns the angles (n_ligaments, 2) of slots against their ligaments, rad."""
@@ -82,11 +82,23 @@ class DesignSpace:
         return np.concatenate([basis.T @ of / basis.power(2).sum(axis=0) for basis, of in parts])
 
 
+@jax.jit
+def _shifted(vertices: Floats, group: Ints, groups: Ints, free_shifts: Array) -> Array:
+    """Shifts vertices by those (n_free, 2) of their groups, if these are free."""
+    shifts = jnp.zeros_like(vertices).at[groups].set(free_shifts)  # no more groups than vertices
+    return jnp.asarray(vertices) + shifts[group]
+
+
 def _product(matrix: sp.csr_array, vector: Array) -> Array:
     """Multiplies a sparse matrix (n, m) by a vector (m,); differentiable by the vector."""
     entries = matrix.tocoo()
-    terms = jnp.asarray(entries.data) * vector[entries.col]
-    return jnp.zeros(matrix.shape[0]).at[entries.row].add(terms)
+    return _summed(entries.data, entries.row, entries.col, vector, matrix.shape[0])
+
+
+@partial(jax.jit, static_argnames="length")
+def _summed(data: Floats, row: Ints, column: Ints, vector: Array, length: int) -> Array:
+    """Sums terms of a product by row (length,)."""
+    return jnp.zeros(length).at[row].add(data * vector[column])
 
 
 def design_space(

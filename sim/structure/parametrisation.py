@@ -2,11 +2,13 @@
 
 from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
-from sim.core import Floats
-from sim.structure.geometry import Shape
+from sim.core import Floats, Ints
+from sim.structure.geometry import Shape, shape
 from sim.structure.lattice import Lattice
 from sim.structure.material import Material
 
@@ -34,11 +36,18 @@ ConcreteParameters: TypeAlias = Parameters[Floats]
 """Concrete parameters, as the solvers take them."""
 
 
-def parameters(lattice: Lattice, shape: Shape, material: Material) -> Parameters[Array]:
+class Ends(NamedTuple):
+    """Arrays of a `Lattice` that its parameters depend on besides its shape."""
+
+    ligaments: Ints
+    ligament_vectors: Floats
+
+
+def parameters(lattice: Lattice | Ends, shape: Shape, material: Material) -> Parameters[Array]:
     """Derives the parameters of a network; differentiable in shape and material."""
-    n = lattice.n_ligaments
+    n_ligaments, n_units = len(lattice.ligaments), len(shape.area)
     stiffness = (material.axial_stiffness, material.shear_stiffness, material.bending_stiffness)
-    angles = jnp.broadcast_to(jnp.asarray(material.end_angles, dtype=float), (n, 2))
+    angles = jnp.broadcast_to(jnp.asarray(material.end_angles, dtype=float), (n_ligaments, 2))
     # a strip straight by itself, clamped at angles a and b to its chord, is so if the units turn by
     # -a and -b about its ends: gamma = -(mean rotation) = (a + b) / 2, kappa = a - b
     natural = (material.elongation, angles.mean(axis=1), angles[:, 0] - angles[:, 1])
@@ -48,15 +57,26 @@ def parameters(lattice: Lattice, shape: Shape, material: Material) -> Parameters
         material.damping_translation,
         material.damping_rotation,
     )
+    contact = jnp.asarray(material.contact_stiffness, dtype=float)
     return Parameters(
         arm=shape.arm[lattice.ligaments],
         vector=jnp.asarray(lattice.ligament_vectors),
         void=shape.void_angle,
-        law=jnp.stack([jnp.broadcast_to(k, (n,)) for k in stiffness], axis=1),
-        natural=jnp.stack([jnp.broadcast_to(strain, (n,)) for strain in natural], axis=1),
-        contact=jnp.broadcast_to(jnp.asarray(material.contact_stiffness, dtype=float), (n,)),
+        law=jnp.stack([jnp.broadcast_to(k, (n_ligaments,)) for k in stiffness], axis=1),
+        natural=jnp.stack([jnp.broadcast_to(e, (n_ligaments,)) for e in natural], axis=1),
+        contact=jnp.broadcast_to(contact, (n_ligaments,)),
         corner=shape.arm,
         centroid=shape.centroid,
         mass=jnp.stack([mass, mass, inertia], axis=1),
-        damping=jnp.stack([jnp.broadcast_to(c, (lattice.n_units,)) for c in damping], axis=1),
+        damping=jnp.stack([jnp.broadcast_to(c, (n_units,)) for c in damping], axis=1),
     )
+
+
+def parameters_at(lattice: Lattice, vertices: Floats, material: Material) -> ConcreteParameters:
+    """Computes the parameters of a network with its ``vertices`` (n_vertices, 2) there, in mm."""
+    ends = Ends(lattice.ligaments, lattice.ligament_vectors)
+    return Parameters(*map(np.asarray, _parameters(ends, shape(lattice, vertices), material)))
+
+
+_parameters = jax.jit(parameters)
+"""Compiles all at once: that is sooner done than each operation by itself."""

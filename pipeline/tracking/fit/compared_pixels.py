@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.runtime import inlined
+from pipeline.runtime import inlined, uncounted
 from pipeline.tracking.fit.template_cells import STEEP
 from sim.core import Floats, Image, Singles
 
@@ -197,7 +197,7 @@ def _within(scene: FramePixels, look: TemplateArrays, pose: Floats, top: int, le
     return x * x + y * y < look.reach * look.reach
 
 
-@inlined
+@uncounted
 def select_pixels(
     scene: FramePixels, look: TemplateArrays, pose: Floats, box: Floats, lists: PixelLists
 ) -> None:

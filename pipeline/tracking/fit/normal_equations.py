@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.runtime import inlined
+from pipeline.runtime import inlined, uncounted
 from pipeline.tracking.fit.compared_pixels import LANES, Indices, PixelLists, TemplateArrays
 from pipeline.tracking.fit.node_mixing import mix_nodes
 from sim.core import Floats, Image, Singles
@@ -241,7 +241,7 @@ def _products_after_unknowns(look: TemplateArrays, state: Floats, matrix: Floats
         _after_unknowns(look, state, matrix[:, i])
 
 
-@inlined
+@uncounted
 def gather_equations(
     look: TemplateArrays, lists: PixelLists, pixels: int, tight: float, room: FitBuffers
 ) -> None:
@@ -269,7 +269,7 @@ def gather_equations(
         room.sums[k] *= (room.state[3] / look.step) ** 2
 
 
-@inlined
+@uncounted
 def gather_scatter(look: TemplateArrays, ends: Indices, blocks: int, room: FitBuffers) -> None:
     """Fills the scatter of blocks, which begin and end in the lanes where it says."""
     part, scatter = room.part, room.scatter
@@ -305,7 +305,7 @@ def _factor(matrix: Floats, factor: Floats) -> bool:
     return True
 
 
-@inlined
+@uncounted
 def invert(matrix: Floats, factor: Floats, inverse: Floats) -> bool:
     """Fills the inverse of a symmetric positive definite matrix; False if it is singular.
 

@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.runtime import compiled, inlined
+from pipeline.runtime import compiled, uncounted
 from sim.core import Floats, Image, Singles
 
 EMPTY, FLAT, STEEP = np.uint8(0), np.uint8(1), np.uint8(2)
@@ -97,7 +97,7 @@ def classify(
                 span[line, 1] = max(last, span[line, 1])
 
 
-@inlined
+@uncounted
 def unfold(brightness: Singles, weight: Singles, span: NodeSpans, nodes: Singles) -> None:
     """Fills nodes (4 rows columns,) in the spans: brightness, its slopes in x and y, and weight.
 

@@ -12,10 +12,8 @@ from functools import cache, cached_property, partial
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
-from jax import Array
 from jax.flatten_util import ravel_pytree
 from numpy.typing import NDArray
 
@@ -142,13 +140,13 @@ class Ray:
         recorded = isinstance(self.rig.motion, sim.TimeSeries)
         size = 0.1 if self.quantity == "drive" and recorded else 1.0
 
-        def change(leaf: Array) -> Array:
-            return size * jnp.asarray(rng.normal(size=leaf.shape)) * (jnp.abs(leaf).max() or 1.0)
+        def change(leaf: Floats) -> Floats:
+            return np.asarray(size * rng.normal(size=leaf.shape) * (np.abs(leaf).max() or 1.0))
 
         changed = jax.tree.map(change, getattr(self.rig.numbers, self.quantity))
         if isinstance(changed, sim.TimeSeries):
-            changed = changed._replace(times=jnp.zeros_like(changed.times))
-        still = jax.tree.map(jnp.zeros_like, self.rig.numbers)
+            changed = changed._replace(times=np.zeros_like(changed.times))
+        still = jax.tree.map(np.zeros_like, self.rig.numbers)
         return still._replace(**{self.quantity: changed})
 
     def at(self, step: float) -> structures.Numbers:
