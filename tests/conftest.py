@@ -1,5 +1,6 @@
 import ctypes
 import gc
+import os
 import signal
 import sys
 
@@ -10,6 +11,9 @@ from hypothesis import HealthCheck, settings
 from pipeline.runtime import pin
 
 pin()  # before anything imports the libraries that this is about
+# What is tested in this process runs but a few times: a quarter of its time was XLA's optimiser.
+# The processes that tests start pin their own flags, and run as they do for users.
+os.environ["XLA_FLAGS"] += " --xla_backend_optimization_level=0"
 
 # What a shell runs in the background ignores Ctrl-C, and the runs under test would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
