@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-import jax.numpy as jnp
+import jax
 import numpy as np
 import xarray as xr
 
@@ -15,6 +15,7 @@ from sim.scene import foil_strains
 from sim.structure import parameters_at
 
 _told = facts_of(__file__)
+_strains = jax.jit(foil_strains, static_argnames="thickness")
 
 
 def strain_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
@@ -66,6 +67,6 @@ def largest_strains(problem: Problem, response: xr.Dataset) -> dict[str, Floats]
         values = parameters_at(lattice, vertices, material_of(problem, lattice))
         motion = part["displacement"].transpose("case", "time", "unit", "dof").values
         ends = motion[:, :, lattice.id][:, :, lattice.ligament_units]
-        strains = [foil_strains(jnp.asarray(one), values, problem.shim_thickness) for one in ends]
-        found[name] = np.array([float(jnp.abs(strain).max()) for strain in strains])
+        strains = [_strains(one, values, thickness=problem.shim_thickness) for one in ends]
+        found[name] = np.array([float(np.abs(strain).max()) for strain in strains])
     return found

@@ -1,7 +1,6 @@
 """Constrains designs by what they do under load: no snap on the way, no foil strained too far."""
 
 from collections.abc import Callable, Iterator
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -160,7 +159,6 @@ def _strain_and_slopes(
     return jax.jit(jax.value_and_grad(ratio, argnums=(0, 1)))
 
 
-@partial(jax.jit, static_argnames="thickness")
 def foil_strains(ends: Array, values: Parameters[Array], thickness: float) -> Array:
     """Computes the extreme strains (n_times, n_ligaments, 4) of ligaments of foil.
 
