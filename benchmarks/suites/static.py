@@ -22,7 +22,7 @@ from benchmarks.scenes import HEAVY, work_of
 from sim.energy import Topology, observe, topology
 from sim.linalg import number_free_dofs
 from sim.quasistatics import StaticSolver
-from sim.solvers import LinearRamp, PrescribedMotion, held_dofs, solve_case
+from sim.solvers import LinearRamp, PrescribedMotion, concrete, held_dofs, solve_case
 from sim.structure import ConcreteParameters, VoidAngleContact, parameters_at, quads
 
 SIDES = (15, 30, 60, 120)
@@ -92,7 +92,7 @@ def _posed(side: int) -> tuple[Topology, ConcreteParameters, PrescribedMotion]:
     right = left + side - 1
     posed = topology(lattice, held_dofs(left, right), VoidAngleContact(*np.deg2rad([-15.0, -10.0])))
     drive = PrescribedMotion(right, LinearRamp(-COMPRESSION * side * lattice.spacing, 1.0))
-    return posed, parameters_at(lattice, lattice.vertices, HEAVY), drive
+    return posed, concrete(parameters_at(lattice, lattice.vertices, HEAVY)), drive
 
 
 def strict(sides: tuple[int, ...]) -> Run:

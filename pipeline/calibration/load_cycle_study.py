@@ -14,7 +14,7 @@ from pipeline.runtime import UserError
 from sim.core import Floats
 from sim.energy import Observables, Topology, ligament_strain, observe, topology
 from sim.quasistatics import StaticSolver, trace_first_snap
-from sim.solvers import PrescribedMotion, TimeSeries, held_dofs, solve_case
+from sim.solvers import PrescribedMotion, TimeSeries, concrete, held_dofs, solve_case
 from sim.structure import ConcreteParameters, Material, parameters_at
 
 KNOWN = {"approach": units.LENGTH, "equilibrium": units.FORCE, "motion": units.FORCE}
@@ -81,7 +81,7 @@ def follow_cycle(asked: LoadCycles, record: CycleRecord, folder: Path) -> CycleP
     made = Material(
         record.material.density, axial, shear, bending, stiffness, translation, rotation
     )
-    values = parameters_at(lattice, lattice.vertices, made)
+    values = concrete(parameters_at(lattice, lattice.vertices, made))
     units_held = (np.array([asked.drive.held]), np.array([asked.drive.driven]))
     fixed = topology(lattice, held_dofs(*units_held), begin.law)
     whole = np.concatenate([path, path[-2::-1]])

@@ -8,6 +8,7 @@ from pipeline.problem import Problem
 from pipeline.problem.sections import Kagome, ListedNetwork, Spectrum
 from pipeline.runtime import UserError
 from sim.core import SimulationError
+from sim.solvers import concrete
 from sim.structure import parameters_at
 from sim.vibration import UnitCell, bands, brillouin_path, cell_of, strained
 
@@ -47,10 +48,10 @@ def _cell(asked: Problem) -> UnitCell:
         what = "a lattice from a file has no unit cell to send waves through"
         raise UserError(what, key="spectrum", remedy="leave the section out")
     lattice = lattice_of(asked)
-    values = parameters_at(lattice, lattice.vertices, material_of(asked, lattice))
+    made = parameters_at(lattice, lattice.vertices, material_of(asked, lattice))
     period = (4, 2) if isinstance(asked.lattice, Kagome) else (2, 2)
     try:
-        return cell_of(lattice, contact_laws(asked)["angle"], values, period)
+        return cell_of(lattice, contact_laws(asked)["angle"], concrete(made), period)
     except ValueError as error:
         what, remedy = str(error), "enlarge the lattice, or leave the section out"
         raise UserError(what, key="spectrum", remedy=remedy) from error

@@ -14,7 +14,7 @@ from sim.core import Floats, Numbers
 from sim.energy import counted_from_rest
 from sim.quasistatics import StaticSolver
 from sim.scene.scene import Scene
-from sim.solvers import LinearRamp, differentiable_motion
+from sim.solvers import LinearRamp, concrete, differentiable_motion
 from sim.structure import ConcreteParameters, Parameters, parameters, parameters_at, shape
 
 
@@ -114,4 +114,4 @@ def parameters_of_copies(scene: Scene) -> list[ParameterMap]:
 
 def concrete_parameters(scene: Scene, vertices: Floats) -> ConcreteParameters:
     """Computes the parameters of a structure as NumPy arrays."""
-    return parameters_at(scene.lattice, vertices, scene.structure.material)
+    return concrete(parameters_at(scene.lattice, vertices, scene.structure.material))

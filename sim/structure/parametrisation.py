@@ -4,10 +4,9 @@ from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
 
-from sim.core import Floats, Ints
+from sim.core import Floats, Ints, Numbers
 from sim.structure.geometry import Shape, shape
 from sim.structure.lattice import Lattice
 from sim.structure.material import Material
@@ -72,10 +71,10 @@ def parameters(lattice: Lattice | Ends, shape: Shape, material: Material) -> Par
     )
 
 
-def parameters_at(lattice: Lattice, vertices: Floats, material: Material) -> ConcreteParameters:
+def parameters_at(lattice: Lattice, vertices: Numbers, material: Material) -> Parameters[Array]:
     """Computes the parameters of a network with its ``vertices`` (n_vertices, 2) there, in mm."""
     ends = Ends(lattice.ligaments, lattice.ligament_vectors)
-    return Parameters(*map(np.asarray, _parameters(ends, shape(lattice, vertices), material)))
+    return _parameters(ends, shape(lattice, vertices), material)
 
 
 _parameters = jax.jit(parameters)

@@ -16,7 +16,7 @@ from sim.core import Floats, Ints
 from sim.energy import Topology, topology
 from sim.energy.network_arrays import NetworkArrays
 from sim.linalg import Matrix
-from sim.solvers import DISPLACEMENT, Solver, differentiable_motion, held_dofs
+from sim.solvers import DISPLACEMENT, Solver, concrete, differentiable_motion, held_dofs
 from sim.structure import (
     ConcreteParameters,
     DesignSpace,
@@ -58,7 +58,7 @@ def central(value: Callable[[float], Any], step: float) -> Any:  # noqa: ANN401 
 
 def at_rest(lattice: sim.Lattice) -> ConcreteParameters:
     """Parameters of a lattice as it is."""
-    return parameters_at(lattice, lattice.vertices, MATERIAL)
+    return concrete(parameters_at(lattice, lattice.vertices, MATERIAL))
 
 
 def assert_equal(found: Floats, wanted: Array | Floats) -> None:

@@ -1,4 +1,7 @@
-"""Loops whose sums may be reordered come in one piece: from the cache as just compiled."""
+"""Loops whose sums may be reordered call those alone that are compiled in the same way.
+
+That they are the same to the bit from the cache: ``tests/slow/test_cached_loops.py``.
+"""
 
 import importlib
 import inspect
@@ -23,10 +26,13 @@ def called(loop: CPUDispatcher) -> Iterator[CPUDispatcher]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_compiled_loop_calls_inlined_ones_only(name: str) -> None:
+def test_a_compiled_loop_calls_those_of_its_kind_only(name: str) -> None:
     for loop in loops(importlib.import_module(name)):
         for other in called(loop):
-            assert other.targetoptions.get("inline") == "always", (loop, other)
+            for option in ("fastmath", "error_model"):
+                assert other.targetoptions[option] == loop.targetoptions[option], (loop, other)
+            inlined = other.targetoptions.get("inline") == "always"
+            assert inlined or other.targetoptions["_nrt"] is False, (loop, other)
 
 
 def test_there_are_such_calls() -> None:
