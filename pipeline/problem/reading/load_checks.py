@@ -1,0 +1,175 @@
+"""Checks loads: drives against supports and one another, their courses, loads in ranges."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from pipeline.problem import Problem
+from pipeline.problem.reading.fault import Findings, ProblemFault
+from pipeline.problem.reading.yaml_file import KeyPath
+from pipeline.problem.sections import (
+    DisplacementDrive,
+    LinearRampDrive,
+    LoadRanges,
+    Selector,
+    SeveralDrives,
+    SingleDrive,
+    TanhRampDrive,
+    TestSetup,
+    selected_units,
+    single_drives,
+)
+
+
+def selectors_of(problem: Problem) -> Iterator[tuple[KeyPath, Selector]]:
+    """Lists the selectors of supports and drives, with their keys."""
+    for index, support in enumerate(problem.supports):
+        yield ("supports", index, "units"), support.units
+    for keys, drive in _drives(problem):
+        yield (*keys, "units"), drive.units
+
+
+def _drives(problem: Problem) -> Iterator[tuple[KeyPath, SingleDrive]]:
+    if not isinstance(problem.drive, SeveralDrives):
+        yield ("drive",), problem.drive
+        return
+    for index, drive in enumerate(problem.drive.drives):
+        yield ("drives", index), drive
+
+
+def units_exist(problem: Problem) -> Findings:
+    """Finds units that the lattice does not have."""
+    for keys, selector in selectors_of(problem):
+        try:
+            selected_units(selector, problem.lattice)
+        except IndexError as error:
+            yield ProblemFault(str(error), keys, problem.lattice.extent)
+
+
+def drive_is_free(problem: Problem) -> Findings:
+    """Finds units that are driven and clamped, or driven twice."""
+    others: list[tuple[set[int], SingleDrive]] = []
+    for keys, drive in _drives(problem):
+        driven = set(selected_units(drive.units, problem.lattice))
+        for support in problem.supports:
+            both = sorted(driven & set(selected_units(support.units, problem.lattice)))
+            if both and not set(drive.acting).isdisjoint(support.clamp):
+                what = f"unit {problem.lattice.name(both[0])} is driven and clamped"
+                yield ProblemFault(what, (*keys, "units"), "drive or clamp it, not both")
+        for units, other in others:
+            if (both := sorted(driven & units)) and (dof := _contested(drive, other)):
+                what = f"unit {problem.lattice.name(both[0])} is driven twice, along {dof}"
+                remedy = "give every unit to one drive, or let the others' way be `free`"
+                yield ProblemFault(what, (*keys, "units"), remedy)
+        others.append((driven, drive))
+
+
+def _contested(one: SingleDrive, other: SingleDrive) -> str | None:
+    """Names a degree of freedom that one of two drives moves and the other does not leave free."""
+    held = [{"ux", "uy", "theta"} - set(drive.free) for drive in (one, other)]
+    moved = [set(drive.acting) for drive in (one, other)]
+    return min(held[0] & moved[1] | held[1] & moved[0], default=None)
+
+
+def one_kind_of_load(problem: Problem) -> Findings:
+    """Finds slow loads beside fast ones, and forces where displacements are asked for."""
+    kinds = single_drives(problem.drive)
+    if len(kinds) > 1 and not problem.static:
+        slow = [d.kind for d in kinds if problem.model_copy(update={"drive": d}).static]
+        if slow:
+            what = f"a {slow[0]} is a slow load, and another of the drives is not"
+            yield ProblemFault(what, ("drives",), "give all of them a course in time, or none")
+    if problem.spectrum is not None and any(d.kind in ("force", "torque") for d in kinds):
+        what = "a spectrum tells the transmission of a displacement, not of a force"
+        yield ProblemFault(what, ("spectrum",), "leave it out, or drive by a displacement")
+
+
+def _steps_of(problem: Problem) -> bool:
+    """Tells a path whose loads can be equal steps."""
+    return all(
+        isinstance(drive, LinearRampDrive) or getattr(drive, "static", False)
+        for drive in single_drives(problem.drive)
+    )
+
+
+def horizon(problem: Problem) -> Findings:
+    """Finds periods and steps that the drive does not have."""
+    if problem.horizon.periods is not None and problem.frequency is None:
+        what = f"a {problem.drive.kind} drive has no period"
+        yield ProblemFault(what, ("horizon", "periods"), 'give `duration`, e.g. "1 s"')
+    if problem.horizon.steps is not None and not _steps_of(problem):
+        what = f"a {problem.drive.kind} drive does not load in equal steps"
+        yield ProblemFault(what, ("horizon", "steps"), "drive by a linear_ramp, or give `samples`")
+
+
+def reaction(problem: Problem) -> Findings:
+    """Finds why the force of the drive cannot be mimicked."""
+    objective, place = problem.objective, ("objective", "reaction")
+    if objective.reaction is None:
+        return
+    if not isinstance(problem.drive, DisplacementDrive):
+        what = f"a drive of the kind {problem.drive.kind} has no displacement that a force answers"
+        yield ProblemFault(what, place, "leave it out, or displace units along a direction")
+    if objective.target == "rest":
+        what = "a structure at rest has no force of the drive to mimic"
+        yield ProblemFault(what, place, "leave it out, or give target: intact")
+    if objective.loads is not None:
+        what = "over loads in ranges motions alone are mimicked"
+        yield ProblemFault(what, place, "leave out one of the two")
+
+
+def loads_in_ranges(problem: Problem) -> Findings:
+    """Finds what a family of loads cannot be of, or cannot be minimised over."""
+    objective = problem.objective
+    if (family := objective.loads) is None:
+        return
+    place = ("objective", "loads")
+    yield from _ranges(problem, family, place)
+    yield from drive_is_free(_turned(problem, family))
+    for index, setup in enumerate(family.setups):
+        posed, keys = problem.in_setup(setup), (*place, "setups", index)
+        turned = _turned(posed, setup)
+        for check in (units_exist, drive_is_free, one_kind_of_load, horizon):
+            yield from (replace(found, keys=(*keys, *found.keys)) for found in check(turned))
+        yield from _ranges(posed, setup, keys)
+        if (posed.static, posed.frequency is None) != (problem.static, problem.frequency is None):
+            what = f"a {setup.drive.kind} drive is of another kind than the study's"
+            yield ProblemFault(what, (*keys, "drive"), f"give one like a {problem.drive.kind}")
+    if objective.robust is not None and objective.robust.loads:
+        what = "loads in ranges take the place of some"
+        yield ProblemFault(what, ("objective", "robust", "loads"), "leave out one of the two")
+    if objective.snap == "avoid":
+        what = "loads in ranges have no one path to keep from snapping"
+        yield ProblemFault(what, ("objective", "snap"), "leave out one of the two")
+    if problem.optimiser.methods.mma is not None:
+        what = "the worst of many loads is minimised by sqp alone"
+        yield ProblemFault(what, ("optimiser", "methods", "mma"), "leave it out (a preset: null)")
+
+
+def _turned(problem: Problem, ranges: LoadRanges | TestSetup) -> Problem:
+    """Turns the drive of a problem along all directions of a range, as far as that matters."""
+    if ranges.directions is None or not isinstance(problem.drive, DisplacementDrive):
+        return problem
+    low, high = ranges.directions
+    ways = (low, 0.75 * low + 0.25 * high, high)  # not all along one axis, unless the range is
+    drive = problem.drive.model_copy(update={"directions": ways, "weights": None})
+    return problem.model_copy(update={"drive": drive})
+
+
+def _ranges(problem: Problem, ranges: LoadRanges | TestSetup, place: KeyPath) -> Findings:
+    """Finds ranges that the drive of a set-up does not have."""
+    drive = problem.drive
+    if isinstance(drive, SeveralDrives):
+        parts = drive.drives
+        ramps = all(isinstance(part, LinearRampDrive | TanhRampDrive) for part in parts)
+        if len(parts) != 2 or not ramps or len(drive.case_weights) > 1:
+            what = "loads in ranges are mixtures of two slow displacements"
+            yield ProblemFault(what, place, "give two ramps, of one direction each")
+    elif not isinstance(drive, DisplacementDrive):
+        what = f"a drive of the kind {drive.kind} has no displacement and direction to vary"
+        yield ProblemFault(what, place, "leave it out, or displace units along a direction")
+    elif ranges.frequency is not None and problem.frequency is None:
+        what = f"a {drive.kind} drive has no frequency to vary"
+        yield ProblemFault(what, (*place, "frequency"), "leave it out")
+    elif ranges.frequency is not None and problem.horizon.periods is None:
+        what = "a time does not fit loads of all frequencies"
+        yield ProblemFault(what, ("horizon", "duration"), "give `periods`")
