@@ -15,7 +15,7 @@ from sim.structure import clearance
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.posing.case_result import PosedStructure
+    from pipeline.posing.case_result import CaseResult, PosedStructure, Times
     from pipeline.problem import Problem
     from sim.structure import ContactModel
 
@@ -29,15 +29,25 @@ _MEASURES = ("loss_by_contact", "overlaps_by_contact", "gap_by_contact", "snaps_
 
 
 def by_contact(
-    structures: dict[str, PosedStructure], laws: dict[str, ContactModel]
+    structures: dict[str, PosedStructure],
+    laws: dict[str, ContactModel],
+    times: Times,
+    measured: dict[str, list[CaseResult]],
 ) -> dict[str, tuple[Any, ...]]:
     """Compares loss, overlaps, smallest gap and snaps of static structures under either law.
 
-    NaN in studies of motion in time, and where a structure cannot be simulated under a law.
+    Under their own law they are as `measured`; under the other one they pass the same loads, all
+    that are asked for. NaN in studies of motion in time, and where a structure cannot be simulated
+    under the other law.
     """
     found = np.array(
         [
-            [_under(name, structure, law, laws[law]) for law in LAWS]
+            [
+                _as_measured(measured[name])
+                if _is_own(structure, laws[law])
+                else _under(name, structure, law, laws[law], times)
+                for law in LAWS
+            ]
             for name, structure in structures.items()
         ],
         dtype=float,
@@ -58,8 +68,21 @@ def under(asked: Problem, law: str) -> Problem:
     return asked.model_copy(update={"contact": contact})
 
 
+def _is_own(structure: PosedStructure, contact: ContactModel) -> bool:
+    scene = structure.scene
+    return scene.loads.static and type(scene.structure.contact) is type(contact)
+
+
+def _as_measured(cases: list[CaseResult]) -> NDArray[np.float64]:
+    """Collects losses, overlaps at most, smallest gaps and snaps (4, n_cases) of solved cases."""
+    each = [
+        (case.loss, case.overlapping.max(), case.gap.min(), len(case.snaps)) for case in cases
+    ]
+    return np.array(each, dtype=float).T
+
+
 def _under(
-    name: str, structure: PosedStructure, law: str, contact: ContactModel
+    name: str, structure: PosedStructure, law: str, contact: ContactModel, times: Times
 ) -> NDArray[np.float64]:
     """Simulates losses, overlaps at most, smallest gaps and snaps (4, n_cases) under a law."""
     nothing = np.full((len(_MEASURES), len(structure.scene.loads.cases)), np.nan)
@@ -67,17 +90,19 @@ def _under(
         return nothing
     scene, vertices = structure.scene.with_contact(contact), structure.vertices
     try:
-        response = simulate(scene, vertices=vertices)
+        response = simulate(scene, vertices=vertices, times=times.asked)
         target = None if scene.objective.reference is None else target_motion(scene)
     except SimulationError as error:
         LOG.warning("%s structure under %s contact: %s", name, law, error)
         return nothing
-    found = [clearance(scene.lattice, vertices, motion) for motion in response.displacement]
+    motion = response.displacement[:, times.shown]
+    found = [clearance(scene.lattice, vertices, each) for each in motion]
+    at_loss = response.displacement[:, times.integrated]
     return np.array(
         [
-            mimicking(scene, target)(response.displacement, response.parameters),
+            mimicking(scene, target)(at_loss, response.parameters),
             [each.overlaps.max() for each in found],
             [each.gap.min() for each in found],
-            [np.count_nonzero(record.jumped) for record in response.records],
+            [len(record.snaps) for record in response.records],
         ]
     )

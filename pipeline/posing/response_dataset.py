@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import xarray as xr
 
-from pipeline.posing.case_result import CaseResult, PosedStructure
+from pipeline.posing.case_result import CaseResult, PosedStructure, Times
 from pipeline.posing.law_comparison import LAWS, by_contact
 from pipeline.posing.structure_variables import (
     Variables,
@@ -36,22 +36,22 @@ Table = dict[str, list[CaseResult]]
 
 
 def assemble_response(
-    asked: Problem, structures: dict[str, PosedStructure], times: Floats, measured: Table
+    asked: Problem, structures: dict[str, PosedStructure], times: Times, measured: Table
 ) -> xr.Dataset:
-    """Assembles the dataset ``response``; `times` (n_times,) are those of the samples shown, s."""
-    scene = structures["altered"].scene
+    """Assembles the dataset ``response`` at the times shown."""
+    shown, scene = times.asked[times.shown], structures["altered"].scene
     variables = {
         **network_variables(asked, scene),
         **_over_units(asked, structures, measured),
         **_over_steps(measured),
         **_over_cases(measured),
         **_snaps(measured),
-        **by_contact(structures, contact_laws(asked)),
-        "drive_displacement": (("case", "time", "xy"), _drive(structures, times)),
+        **by_contact(structures, contact_laws(asked), times, measured),
+        "drive_displacement": (("case", "time", "xy"), _drive(structures, shown)),
     }
     for name in ("loss", "loss_other_branch", "loss_samples", "loss_by_contact"):
         variables[name] = (*variables[name], {"units": loss_units(asked)})
-    return xr.Dataset(variables, _coordinates(asked, structures, times))
+    return xr.Dataset(variables, _coordinates(asked, structures, shown))
 
 
 def loss_units(asked: Problem) -> str:

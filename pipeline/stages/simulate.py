@@ -113,7 +113,7 @@ def response_dataset(
     """
     times = times_of(asked, structures["altered"].scene)
     measured, plans = measured_cases(structures, times, threads)
-    return assemble_response(asked, structures, times.asked[times.shown], measured), plans
+    return assemble_response(asked, structures, times, measured), plans
 
 
 def measured_cases(
