@@ -75,9 +75,7 @@ def _is_own(structure: PosedStructure, contact: ContactModel) -> bool:
 
 def _as_measured(cases: list[CaseResult]) -> NDArray[np.float64]:
     """Collects losses, overlaps at most, smallest gaps and snaps (4, n_cases) of solved cases."""
-    each = [
-        (case.loss, case.overlapping.max(), case.gap.min(), len(case.snaps)) for case in cases
-    ]
+    each = [(case.loss, case.overlapping.max(), case.gap.min(), len(case.snaps)) for case in cases]
     return np.array(each, dtype=float).T
 
 

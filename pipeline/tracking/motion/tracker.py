@@ -10,41 +10,18 @@ from pipeline.runtime import Picture
 from pipeline.tracking.detect import LatticePlace, Relocaliser
 from pipeline.tracking.fit import ExposureBlur, PoseFits, PoseFitter, SideWalls
 from pipeline.tracking.geometry import SpecimenOutlines
+from pipeline.tracking.motion.exposure_meter import ExposureMeter
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.prediction import Neighbourhood, latest_velocity
+from pipeline.tracking.motion.unit_looks import SHARE, SHARE_KNOWN, UnitLooks
 from sim.core import Floats, Ints, Mask, Reals
 
 LOG = logging.getLogger(__name__)
 
-GOOD, OUT_OF_FRAME, HIDDEN, GLARE, POOR_FIT, STRAYED = range(6)
-"""Quality of a unit in a frame, and the reason why it is missing."""
-
-_SETTLED = 0.3
-"""Last Gauss-Newton step of a fit that found its place, px."""
-_SHARE = 0.35
-"""Least part of a unit's information that a fit needs; less if photometry and place are known."""
-_SHARE_KNOWN = 0.18
-_PARTLY, _SHADED = 0.6, (0.06, 0.15)
-"""Brightness of a unit that is seen as before: changes of slopes from which its fit has to be
-better, and from which one that is seen in part, less than so much, is none."""
-_GAIN = (0.12, 4.0)
-"""Gain, against the reference frame's, between which a unit can be seen."""
-_QUICK, _SHARP = 2.0, 0.7
-"""A unit that moves by so many px from frame to frame, and of which less than this part is seen,
-may be blurred by its motion where the exposure is not known."""
-_PARTS = np.linspace(0.0, 1.0, 9)
-"""Exposures that are tried where none is told, over the interval of frames."""
-_TELLING, _FEW_QUICK, _MANY_QUICK, _ENOUGH = 5.0, 3, 16, 5
-"""Motion from frame to frame that tells of the exposure, px; units that must make it, and that are
-looked at, at most; frames."""
-_MIXED = 2.5
-"""Pixels over which the sampling of a template averages its noise already."""
+_QUICK = 2.0
+"""Motion from frame to frame that may blur a unit where the exposure is not known, px."""
 _PAST = 3
 """Frames before one that tell of its velocities."""
-_GLARE = 0.4
-_MISFIT = 0.15
-"""Residuals of a good fit, in contrasts of the unit; or so many times the reference frame's: """
-_NOISIER = 4.0
 _STRAY = 0.25
 """A unit so far from where its neighbours carry it is another one, or none, pitches."""
 _TURNED = 0.5
@@ -77,14 +54,6 @@ class Shutter(NamedTuple):
 
 
 _GLOBAL = Shutter()
-
-
-class MotionBlur(NamedTuple):
-    """Holds what a quick motion tells of the exposure."""
-
-    time: float  # of the frame, s
-    exposure: float  # which blurs as is seen, s
-    speed: Floats  # (units,) by which it does, mm/s; NaN of those that are not quick
 
 
 class TrackedFrame(NamedTuple):
@@ -121,8 +90,7 @@ class Tracker:
         seen: (units,) which are not hidden in the first frame; others have no reference.
 
     Attributes:
-        exposure: of a row, s; zero as long as it is not known.
-        blurs: by which it was measured, if it is not told.
+        exposure: of a row, measured if it is not told.
     """
 
     def __init__(
@@ -138,13 +106,12 @@ class Tracker:
     ) -> None:
         self._fitter, self._relocaliser, self._walls = fitter, relocaliser, walls
         self._shutter, self._blur, self._slopes = shutter, blur, slopes
-        self.exposure = shutter.exposure or 0.0
-        self._open = shutter.exposure is None and blur is not None
-        self.blurs: list[MotionBlur] = []
+        self.exposure = ExposureMeter(shutter.exposure, fitter.templates.noise, blur is not None)
         self._past: list[tuple[float, Floats]] = []
         self._out_of_sight = False
         self._time, self._interval = 0.0, 0.0
         self._seen = np.ones(specimen.count, bool) if seen is None else seen
+        self._looks: UnitLooks | None = None
         self._stray = _STRAY * specimen.pitch
         self._neighbours = Neighbourhood(specimen.centre)
         self._centre = specimen.centre
@@ -153,32 +120,30 @@ class Tracker:
         self._pose, self._photometry = fitter.start(1.0)
         self._whole = self._pose
         self._velocity = np.zeros_like(self._pose)
-        self._gain = np.empty(0)
-        self._limit = np.empty(0)
-        self._noise = np.empty(0)
         self._usual = np.zeros(specimen.count)
 
     def step(self, image: Picture, time: float) -> TrackedFrame:
         """Finds the units in the next frame, at a time in s."""
-        first = not len(self._gain)
+        first = self._looks is None
         self._interval, self._time = 0.0 if first else time - self._time, time
         fits = self._fit(image, self._predicted(), self._photometry)
         if not first and (self._shutter.readout or self._blur is not None):
             self._improve_velocity(fits.pose)
-            if self._open:
+            if self.exposure.open:
                 self._measure_exposure(image, fits)
-            if self._shutter.readout or self.exposure:
+            if self._shutter.readout or self.exposure.time:
                 fits = self._fit(image, fits.pose, fits.photometry)
         if first:
-            self._set_reference(fits)
-        good = self._complete(image, fits, self._accepted(fits, _SHARE))
+            self._looks = UnitLooks(fits, self._fitter.templates, self._shutter.noise, self._seen)
+            self._fitter.full = np.nan_to_num(fits.information)
+        good = self._complete(image, fits, self._accepted(fits, SHARE))
         jumped = good.mean() < _FEW
         if jumped and not first:
             fits, good = self._relocalise(image, fits, good)
         if self._out_of_sight and good.sum() <= _HALF * self._relocaliser.in_view(self._pose).sum():
             good[:] = False  # a few may be others, a unit aside
         good &= ~self._neighbours.collisions(fits.pose, good, _CLOSE)
-        quality = self._reasons(fits, good)
+        quality = self._known.reasons(fits, good, self._relocaliser.in_view(self._pose))
         if self._slopes is not None and not first:
             self._slopes.apply(fits, good)
         for values in fits:
@@ -198,7 +163,7 @@ class Tracker:
         rows = self._fitter.camera.size[1]
         drift = self._velocity * (self._shutter.readout / rows) if self._shutter.readout else None
         if self._blur is not None:
-            way = self._velocity * self.exposure
+            way = self._velocity * self.exposure.time
             cos, sin = np.cos(self._pose[:, 2]), np.sin(self._pose[:, 2])
             x, y = way[:, 0], way[:, 1]
             own = np.stack([cos * x + sin * y, cos * y - sin * x, way[:, 2]], axis=1)
@@ -213,35 +178,18 @@ class Tracker:
         return whole if self._blur is None else self._blur.share.copy()
 
     def _measure_exposure(self, image: Picture, fits: PoseFits) -> None:
-        """Takes the exposure that leaves the least residuals of the units that are quick enough.
-
-        It is the median of what the first such frames tell. What a blur takes of the template's own
-        noise, by the inverse of its length, is no sign of it.
-        """
-        way = np.linalg.norm(self._velocity[:, :2], axis=1) * self._interval / self._pixel
-        quick = self._accepted(fits, _SHARE, sharp=False) & (way > _TELLING)
-        quick &= np.isfinite([pose[:, 0] for _, pose in self._past]).all(axis=0)
-        if quick.sum() < _FEW_QUICK or len(self._past) < 2:
+        way = np.linalg.norm(self._velocity[:, :2], axis=1) * self._interval
+        there = self._accepted(fits, SHARE, sharp=False)
+        there &= np.isfinite([pose[:, 0] for _, pose in self._past]).all(axis=0)
+        if len(self._past) < 2:
             return
-        ids = np.flatnonzero(quick)
-        quick[:] = False
-        quick[ids[:: -(-len(ids) // _MANY_QUICK)]] = True
-        left, noise = [], self._fitter.templates.noise
-        for part in _PARTS:
-            self.exposure = part * self._interval
-            again = self._fit(image, fits.pose, fits.photometry, quick)
-            rest = (again.noise / self._photometry[:, 0])[quick] ** 2
-            smoothed = noise**2 / np.sqrt(_MIXED**2 + (part * way[quick]) ** 2)
-            left.append(float(np.nanmean(rest - smoothed)))
-        best = int(np.clip(np.argmin(left), 1, len(left) - 2))
-        near = slice(best - 1, best + 2)  # the blur's variance grows with the square of its length
-        bend, slope, _ = np.polyfit(_PARTS[near] ** 2, left[near], 2)
-        square = -0.5 * slope / bend if bend > 0 else _PARTS[np.argmin(left)] ** 2
-        told = float(np.sqrt(np.clip(square, 0.0, 1.0))) * self._interval
-        speed = np.where(quick, way / self._interval, np.nan) * self._pixel
-        self.blurs.append(MotionBlur(self._time, told, speed))
-        self.exposure = float(np.median([blur.exposure for blur in self.blurs]))
-        self._open = len(self.blurs) < _ENOUGH
+
+        def left(chosen: Mask) -> Floats:
+            """Residuals of units fitted again, in gains of the frame before."""
+            again = self._fit(image, fits.pose, fits.photometry, chosen)
+            return (again.noise / self._photometry[:, 0])[chosen]
+
+        self.exposure.measure(self._time, self._interval, way, self._pixel, there, left)
 
     def _improve_velocity(self, pose: Floats) -> None:
         """Takes the velocities at this frame from the poses of it and of those before."""
@@ -255,34 +203,17 @@ class Tracker:
             self._walls.redraw(ahead)
         return ahead
 
-    def _set_reference(self, fits: PoseFits) -> None:
-        """Takes the first frame as what a unit seen whole looks like."""
-        gain = np.abs(fits.photometry[:, 0])
-        relative = fits.noise / gain
-        usual = np.nanmedian(relative)
-        self._gain = np.where(np.isfinite(gain), gain, 1.0)
-        self._noise = np.fmax(np.where(np.isfinite(relative), relative, usual), usual)
-        self._noise = np.maximum(self._noise, self._shutter.noise / self._gain)
-        contrast = self._fitter.templates.contrast
-        self._limit = np.maximum(_NOISIER * self._noise, _MISFIT * contrast)
-        self._fitter.full = np.nan_to_num(fits.information)
+    @property
+    def _known(self) -> UnitLooks:
+        assert self._looks is not None, "the first frame is the reference"
+        return self._looks
 
     def _accepted(self, fits: PoseFits, share: float, sharp: bool = True) -> Mask:
-        """Judges fits; the less of a unit is seen, the better its fit has to be."""
-        gain = fits.photometry[:, 0]
-        relative = gain / self._gain
-        seen = np.minimum(fits.share, 1.0)
-        shaded = np.linalg.norm((fits.photometry - self._photometry)[:, 2:], axis=1)
-        part = np.where(shaded < _SHADED[0], 0.5 * (1 + seen), seen)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            fitting = fits.noise / np.abs(gain) < self._limit * part
-        settled = fits.last < _SETTLED * seen**2
-        if sharp and not self.exposure and self._interval > 0:
+        """Judges fits; one that its motion may have blurred needs to be seen whole."""
+        quick = None
+        if sharp and not self.exposure.time and self._interval > 0:
             quick = np.linalg.norm((fits.pose - self._pose)[:, :2], axis=1) > _QUICK * self._pixel
-            fitting &= ~(quick & (seen < _SHARP))
-        settled &= (seen > _PARTLY) | (shaded < _SHADED[1])
-        lit = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
-        return np.isfinite(fits.pose[:, 0]) & settled & fitting & lit & self._seen
+        return self._known.accepted(fits, self._photometry, share, quick)
 
     def _complete(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Looks for what is missing, where the good ones say."""
@@ -338,7 +269,7 @@ class Tracker:
             again, none = fits.copy(), np.zeros(len(place.pose), bool)
             self._pose = place.pose
             guess = place.pose + np.array([0.0, 0.0, own])
-            good = self._try(image, again, none, (guess, self._photometry, None, _SHARE))
+            good = self._try(image, again, none, (guess, self._photometry, None, SHARE))
             there = self._relocaliser.in_view(place.pose).sum()
             out.append(_Trial(place, again, good, bool(good.sum() > _HALF * there)))
         return out
@@ -381,7 +312,7 @@ class Tracker:
                 break
             photometry = self._photometry * self._gain_change(fits, good)
             again = self._fit(image, guess, photometry, wanted)
-            new = self._accepted(again, _SHARE) & wanted & self._near(again, guess)
+            new = self._accepted(again, SHARE) & wanted & self._near(again, guess)
             if not new.any():
                 break
             fits.take(again, new)
@@ -391,13 +322,13 @@ class Tracker:
     def _retry_hidden(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Tries those again that may be hidden in part: place and brightness are known."""
         photometry = self._photometry * self._gain_change(fits, good)
-        tight = _TIGHT * self._noise * np.abs(photometry[:, 0])
+        tight = _TIGHT * self._known.noise * np.abs(photometry[:, 0])
         for _ in range(_RETRIES):
             if good.all():
                 break
             before = int(good.sum())
             for guess in self._hidden_poses(fits, good):
-                for least, scale in ((_SHARE, None), (_SHARE_KNOWN, tight)):
+                for least, scale in ((SHARE, None), (SHARE_KNOWN, tight)):
                     good = self._try(image, fits, good, (guess, photometry, scale, least))
             if good.sum() == before:
                 break
@@ -442,17 +373,6 @@ class Tracker:
         if not good.any():
             return 1.0
         return float(np.median(fits.photometry[good, 0] / self._photometry[good, 0]))
-
-    def _reasons(self, fits: PoseFits, good: Mask) -> Ints:
-        inside = self._relocaliser.in_view(self._pose)
-        relative = fits.photometry[:, 0] / self._gain
-        reasons = np.full(len(good), HIDDEN)
-        reasons[np.isfinite(fits.pose[:, 0]) & (fits.share > _SHARE)] = POOR_FIT
-        reasons[(relative < _GLARE) & (fits.photometry[:, 1] > 0)] = GLARE
-        reasons[~self._seen] = HIDDEN
-        reasons[~inside] = OUT_OF_FRAME
-        reasons[good] = GOOD
-        return reasons
 
     def _update(self, fits: PoseFits, good: Mask, still: bool) -> None:
         carried = self._neighbours.predict_rigid(self._pose, fits.pose, good, ~good)

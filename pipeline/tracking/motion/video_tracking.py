@@ -26,7 +26,8 @@ from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults, unro
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.motion_modes import count_at_rest
 from pipeline.tracking.motion.time_interpolation import at_frame_times, middle_speed
-from pipeline.tracking.motion.tracker import GOOD, HIDDEN, POOR_FIT, Shutter, Tracker
+from pipeline.tracking.motion.tracker import Shutter, Tracker
+from pipeline.tracking.motion.unit_looks import GOOD, HIDDEN, POOR_FIT
 from pipeline.tracking.reference_frame import (
     CameraCalibration,
     RecordingSetup,
@@ -179,12 +180,12 @@ def _vague(sigma: Reals, pixel: float) -> Mask:
 def _exposure(tracker: Tracker, motion: Reals, times: Floats) -> float:
     """Returns the exposure that blurs as was seen, by speeds that later frames tell as well."""
     found = []
-    for blur in tracker.blurs:
+    for blur in tracker.exposure.blurs:
         speed = middle_speed(motion.astype(float), times, int(np.searchsorted(times, blur.time)))
         ratio = blur.speed / speed
         known = np.isfinite(ratio)
         found.append(blur.exposure * float(np.median(ratio[known])) if known.any() else np.nan)
-    return float(np.nanmedian(found)) if np.isfinite(found).any() else tracker.exposure
+    return float(np.nanmedian(found)) if np.isfinite(found).any() else tracker.exposure.time
 
 
 def _count_from_rest(motion: Reals, count: int, offset: Singles) -> None:

@@ -1,0 +1,84 @@
+"""Judges fits of units by how these look in the first frame, and says why others are missing."""
+
+import numpy as np
+
+from pipeline.tracking.fit import PoseFits, Templates
+from sim.core import Floats, Ints, Mask
+
+GOOD, OUT_OF_FRAME, HIDDEN, GLARE, POOR_FIT, STRAYED = range(6)
+"""Quality of a unit in a frame, and the reason why it is missing."""
+SHARE = 0.35
+"""Least part of a unit's information that a fit needs; less if photometry and place are known."""
+SHARE_KNOWN = 0.18
+
+_SETTLED = 0.3
+"""Last Gauss-Newton step of a fit that found its place, px."""
+_PARTLY, _SHADED = 0.6, (0.06, 0.15)
+"""Brightness of a unit that is seen as before: changes of slopes from which its fit has to be
+better, and from which one that is seen in part, less than so much, is none."""
+_GAIN = (0.12, 4.0)
+"""Gain, against the first frame's, between which a unit can be seen."""
+_SHARP = 0.7
+"""Part of a unit that has to be seen where its motion may have blurred it."""
+_GLARE = 0.4
+_MISFIT = 0.15
+"""Residuals of a good fit, in contrasts of the unit; or so many times the first frame's: """
+_NOISIER = 4.0
+
+
+class UnitLooks:
+    """Holds gains and residuals of units in the first frame.
+
+    Args:
+        fits: of the first frame.
+        templates: of the units.
+        sensor_noise: residuals to expect of the sensor's noise, levels.
+        seen: (units,) which are not hidden in the first frame; others have no reference.
+
+    Attributes:
+        noise: (units,) residuals, in gains.
+    """
+
+    def __init__(
+        self, fits: PoseFits, templates: Templates, sensor_noise: float, seen: Mask
+    ) -> None:
+        gain = np.abs(fits.photometry[:, 0])
+        relative = fits.noise / gain
+        usual = np.nanmedian(relative)
+        self._gain = np.where(np.isfinite(gain), gain, 1.0)
+        noise = np.fmax(np.where(np.isfinite(relative), relative, usual), usual)
+        self.noise = np.maximum(noise, sensor_noise / self._gain)
+        self._limit = np.maximum(_NOISIER * self.noise, _MISFIT * templates.contrast)
+        self._seen = seen
+
+    def accepted(
+        self, fits: PoseFits, photometry: Floats, share: float, quick: Mask | None
+    ) -> Mask:
+        """Judges fits (units,); the less of a unit is seen, the better its fit has to be.
+
+        `photometry` is that of the frame before; `quick` units may be blurred by their motion.
+        """
+        gain = fits.photometry[:, 0]
+        relative = gain / self._gain
+        seen = np.minimum(fits.share, 1.0)
+        shaded = np.linalg.norm((fits.photometry - photometry)[:, 2:], axis=1)
+        part = np.where(shaded < _SHADED[0], 0.5 * (1 + seen), seen)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            fitting = fits.noise / np.abs(gain) < self._limit * part
+        settled = fits.last < _SETTLED * seen**2
+        if quick is not None:
+            fitting &= ~(quick & (seen < _SHARP))
+        settled &= (seen > _PARTLY) | (shaded < _SHADED[1])
+        lit = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
+        return np.isfinite(fits.pose[:, 0]) & settled & fitting & lit & self._seen
+
+    def reasons(self, fits: PoseFits, good: Mask, inside: Mask) -> Ints:
+        """Says of each unit that it is `good`, or why it is missing; `inside` are in view."""
+        relative = fits.photometry[:, 0] / self._gain
+        reasons = np.full(len(good), HIDDEN)
+        reasons[np.isfinite(fits.pose[:, 0]) & (fits.share > SHARE)] = POOR_FIT
+        reasons[(relative < _GLARE) & (fits.photometry[:, 1] > 0)] = GLARE
+        reasons[~self._seen] = HIDDEN
+        reasons[~inside] = OUT_OF_FRAME
+        reasons[good] = GOOD
+        return reasons
