@@ -26,15 +26,16 @@ class Shape(NamedTuple):
 
 def shape(lattice: Lattice, vertices: Numbers) -> Shape:
     """Computes the shape of the network with its ``vertices`` (n_vertices, 2) there, in mm."""
-    return _shape(Rings(*(getattr(lattice, name) for name in Rings._fields)), jnp.asarray(vertices))
+    return _shape(arrays_of(lattice), jnp.asarray(vertices))
 
 
-class Rings(NamedTuple):
-    """Arrays of a `Lattice` that its shape depends on besides the vertices."""
+class LatticeArrays(NamedTuple):
+    """Holds the arrays of a `Lattice` that functions are compiled for."""
 
     unit: Ints
     site: Floats
     ligaments: Ints
+    ligament_vectors: Floats
     next_vertex: Ints
     previous_vertex: Ints
 
@@ -44,15 +45,20 @@ class Rings(NamedTuple):
         return len(self.site)
 
 
+def arrays_of(lattice: Lattice) -> LatticeArrays:
+    """Collects the arrays of a lattice."""
+    return LatticeArrays(*(getattr(lattice, name) for name in LatticeArrays._fields))
+
+
 @jax.jit
-def _shape(lattice: Rings, vertices: Array) -> Shape:
+def _shape(lattice: LatticeArrays, vertices: Array) -> Shape:
     """Compiles all at once: that is sooner done than each operation by itself."""
     centroid, area, polar_moment = inertia(lattice, vertices)
     arm = vertices - centroid[lattice.unit]
     return Shape(centroid, area, polar_moment, arm, void_angles(lattice, vertices))
 
 
-def inertia(lattice: Lattice | Rings, vertices: Numbers) -> tuple[Array, Array, Array]:
+def inertia(lattice: Lattice | LatticeArrays, vertices: Numbers) -> tuple[Array, Array, Array]:
     """Computes centroid, area and polar moment about the centroid of each polygon (shoelace sums).
 
     Vertices are taken relative to the lattice point: the sums cancel badly far from the origin.
@@ -72,7 +78,7 @@ def inertia(lattice: Lattice | Rings, vertices: Numbers) -> tuple[Array, Array, 
     return jnp.asarray(lattice.site) + offset, area, polar_moment
 
 
-def void_angles(lattice: Lattice | Rings, vertices: Numbers) -> Array:
+def void_angles(lattice: Lattice | LatticeArrays, vertices: Numbers) -> Array:
     """Measures the signed, unwrapped void angles (n_ligaments, 2) beside each ligament, rad.
 
     The first lies between the clockwise edge of the second end and the counter-clockwise edge of

@@ -6,8 +6,8 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from sim.core import Floats, Ints, Numbers
-from sim.structure.geometry import Shape, shape
+from sim.core import Floats, Numbers
+from sim.structure.geometry import LatticeArrays, Shape, arrays_of, shape
 from sim.structure.lattice import Lattice
 from sim.structure.material import Material
 
@@ -35,14 +35,9 @@ ConcreteParameters: TypeAlias = Parameters[Floats]
 """Concrete parameters, as the solvers take them."""
 
 
-class Ends(NamedTuple):
-    """Arrays of a `Lattice` that its parameters depend on besides its shape."""
-
-    ligaments: Ints
-    ligament_vectors: Floats
-
-
-def parameters(lattice: Lattice | Ends, shape: Shape, material: Material) -> Parameters[Array]:
+def parameters(
+    lattice: Lattice | LatticeArrays, shape: Shape, material: Material
+) -> Parameters[Array]:
     """Derives the parameters of a network; differentiable in shape and material."""
     n_ligaments, n_units = len(lattice.ligaments), len(shape.area)
     stiffness = (material.axial_stiffness, material.shear_stiffness, material.bending_stiffness)
@@ -73,8 +68,7 @@ def parameters(lattice: Lattice | Ends, shape: Shape, material: Material) -> Par
 
 def parameters_at(lattice: Lattice, vertices: Numbers, material: Material) -> Parameters[Array]:
     """Computes the parameters of a network with its ``vertices`` (n_vertices, 2) there, in mm."""
-    ends = Ends(lattice.ligaments, lattice.ligament_vectors)
-    return _parameters(ends, shape(lattice, vertices), material)
+    return _parameters(arrays_of(lattice), shape(lattice, vertices), material)
 
 
 _parameters = jax.jit(parameters)
