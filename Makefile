@@ -9,7 +9,7 @@ PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains certif
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
 INSTALL = $(BIN)/python pipeline/workflow/install_lock.py $(if $(WHEELS),--wheels "$(abspath $(WHEELS))")
-PYTEST ?= -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients --ignore tests/cluster --ignore tests/slow
+PYTEST ?= -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients --ignore tests/cluster --ignore tests/slow -m 'not slow'
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
@@ -37,7 +37,7 @@ help:
 	@echo "make publish   build fig2 (or STUDY=...) and write it as an RO-Crate: results/fig2_crate"
 	@echo "make test      run the tests"
 	@echo "make nightly   run what takes longer: the four below, with a table of them (PARTS=clients: one)"
-	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
+	@echo "make test-slow run the tests that make test leaves out: two builds from nothing, kills at random"
 	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/nightly)"
 	@echo "make cluster   make this machine a SLURM of one node and run the tests on it"
 	@echo "make pythons   run a quick part of the tests on the other Pythons that pyenv has installed"
@@ -115,7 +115,7 @@ docs: dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
 test-slow: dev
-	$(BIN)/python -m pytest tests/slow
+	$(BIN)/python -m pytest -m slow --ignore tests/clients --ignore tests/cluster
 
 clients: dev
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests/clients

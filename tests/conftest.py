@@ -43,6 +43,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return min((FIRST.index(name) for name in names if name in FIRST), default=len(FIRST))
 
     items.sort(key=place)
+    for item in items:
+        if item.path.parent.name == "slow":
+            item.add_marker(pytest.mark.slow)
 
 
 def pytest_collection_finish() -> None:

@@ -30,6 +30,7 @@ def test_scenes_have_the_law_that_all_methods_have(name: str) -> None:
 
 
 @pytest.mark.parametrize("way", [0, 1])
+@pytest.mark.slow
 def test_our_equilibria_and_gradients(way: int, reference: Found) -> None:
     method = own_solvers.at_rest("small_push", (1e-10,))[way]
     found = missed(method, 1e-10, "gradient", reference)
@@ -37,6 +38,7 @@ def test_our_equilibria_and_gradients(way: int, reference: Found) -> None:
     assert max(found.values()) < 1e-9
 
 
+@pytest.mark.slow
 def test_differences_and_scipy_come_to_the_reference(reference: Found) -> None:
     found = missed(own_solvers.differences("small_push"), 1e-4, "gradient", reference)
     assert found["gradient"] < 1e-7

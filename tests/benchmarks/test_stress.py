@@ -149,6 +149,7 @@ def test_drawn_designs_can_be_made_and_reach_their_bounds() -> None:
     np.testing.assert_array_equal(vertices, draws(3))
 
 
+@pytest.mark.slow
 def test_the_suite_in_small_finds_nothing_wrong(tmp_path: Path) -> None:
     path = tmp_path / "stress.json"
     assert suite.main(["--small", *IN_SMALL, "--out", str(path)]) == 0

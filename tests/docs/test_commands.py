@@ -51,6 +51,7 @@ def test_make_knows_its_targets(command: Command, checkout: Checkout) -> None:
     subprocess.run(words, cwd=checkout.root, capture_output=True, check=True)
 
 
+@pytest.mark.slow
 def test_snakemake_plans_its_targets(checkout: Checkout) -> None:
     known = set(checkout.snakemake("--list-target-rules").stdout.split())
     asked = {

@@ -37,11 +37,11 @@ def test_tests_that_pages_name_are_there(page: str) -> None:
 FOLDER = ROOT / "docs/examples"
 PINNED: dict[str, dict[str, float]] = tables("docs")["examples"]
 NAMES = sorted(p.stem for p in FOLDER.glob("*.py") if p.stem not in ("render", "specimen"))
-OPTIMISING = ("hidden_void", "resumed_run", "robust_design", "shielding_cloak")
+SLOW = ("hidden_void", "resumed_run", "robust_design", "shielding_cloak", "track_video")
 """Examples that take eight seconds and more: tests/slow runs them."""
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in OPTIMISING])
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in SLOW])
 def test_an_example_gives_its_numbers(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     check_numbers(name, monkeypatch)
 

@@ -37,9 +37,10 @@ objective: { region: { disc: { radius: 8 mm } } }
 """),
 )
 HIDDEN = Small("fig5", start=0.4209155415, end=0.08393655071)
+STUDIES = [SPARED, pytest.param(HIDDEN, marks=pytest.mark.slow)]
 
 
-@pytest.fixture(scope="module", params=[SPARED, HIDDEN], ids=lambda small: small.study)
+@pytest.fixture(scope="module", params=STUDIES, ids=["fig4", "fig5"])
 def small(request: pytest.FixtureRequest) -> Small:
     chosen: Small = request.param
     return chosen

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 import psutil
+import pytest
 
 from tests.e2e.checkout import Checkout, wait_until
 from tests.workflow.conftest import Sandbox
@@ -32,6 +33,7 @@ def start(sandbox: Sandbox, target: str, more: int = 0) -> subprocess.Popen[str]
     return run
 
 
+@pytest.mark.slow
 def test_run_goes_on_after_a_kill_beside_another_study(sandbox: Sandbox) -> None:
     """Left-over jobs end, those of a run that is at work on another study do not."""
     sandbox.stage_seconds = 60.0

@@ -42,6 +42,7 @@ def found(made: Path) -> xr.Dataset:
     return datasets.read(made / "found.nc", "calibration")
 
 
+@pytest.mark.slow
 def test_the_truth_is_within_the_intervals(found: xr.Dataset) -> None:
     names = found["parameter"].values.tolist()
     assert names == [*ALL, "damping_translation", "damping_rotation"]

@@ -14,6 +14,7 @@ FOLDER = ROOT / "experiments/validation"
 ASKED = load_section(FOLDER / "pictures.yaml", KnownPictures)
 
 
+@pytest.mark.slow
 def test_parts_move_as_another_program_has_them_and_the_specimen_is_found() -> None:
     made = study_pictures(ASKED, FOLDER)
     apart = (made["measured"] - made["reference"]).values
@@ -25,6 +26,7 @@ def test_parts_move_as_another_program_has_them_and_the_specimen_is_found() -> N
     np.testing.assert_allclose(made["pixel_size"], ASKED.specimen.pixel_size, rtol=0.05)
 
 
+@pytest.mark.slow
 def test_pixels_at_the_edge_tell_of_the_rotation_of_a_small_part() -> None:
     lever = [each for each in moved_parts(ASKED.rigid_parts, FOLDER) if each.part == 1][:4]
 

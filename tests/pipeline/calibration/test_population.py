@@ -53,6 +53,7 @@ def curves(*factors: float) -> list[SampleCurve]:
     return [*own, SampleCurve("compression_s1_s2", "compression", SAMPLES, way, mean)]
 
 
+@pytest.mark.slow
 def test_emulated_curves(asked: Population, centre: Constants, emulator: CurveEmulator) -> None:
     assert emulator.error < 5e-4
     at = np.array([0.4, 1.7, 3.6])

@@ -64,6 +64,7 @@ def test_gaps_are_left_out_and_nothing_at_all_gives_no_number() -> None:
     assert np.isnan(estimate_metrics(pair(0.01), None, np.random.default_rng(0))[:, SHIFT]).all()
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
     """Units off by amounts of their own, of a known mean square."""
     held = 0

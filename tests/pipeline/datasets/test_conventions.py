@@ -27,6 +27,7 @@ def written(kind: Kind, folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_checker_of_the_conventions_finds_nothing(tmp_path: Path) -> None:
     files = [str(written(kind, tmp_path)) for kind in KINDS]
     strictly = ["--test=cf:1.11", "--criteria=strict", f"--skip-checks={CALENDAR}"]

@@ -153,7 +153,7 @@ def designs(
     return constraints, drawn, int(np.argmax(least < 0.0)) - 1
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_design_with_room_for_straight_slots_has_none_that_turns(seed: int) -> None:
     """Random shifts, as large as the limits allow: the rule of slots finds straight ones."""
     settings = Fabrication()
@@ -167,7 +167,9 @@ def test_a_design_with_room_for_straight_slots_has_none_that_turns(seed: int) ->
     assert bent.max() > 0.01
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))]
+)
 def test_slots_that_turn_with_the_design_are_drawn_so(seed: int) -> None:
     """Random shifts and angles, as large as the limits allow."""
     limits = replace(LIMITS, slot_turn=np.deg2rad(30.0))

@@ -54,6 +54,7 @@ def test_the_drives_own_cases_come_first(robust: Path) -> None:
     assert scene.objective.copy_sharpness == 4.0
 
 
+@pytest.mark.slow
 def test_a_robust_design_tells_losses_of_the_drives_own_cases(robust: Path, tmp_path: Path) -> None:
     out = tmp_path / "design_sqp.nc"
     content = yaml.safe_load(robust.read_text())
@@ -126,7 +127,9 @@ def _starting(fig2: Path, folder: Path, own: dict[str, object], again: dict[str,
     ("own", "again"),
     [
         ({}, {}),
-        ({"void": OFF_CENTRE, "optimiser": {"symmetry": "none"}}, {}),
+        pytest.param(
+            {"void": OFF_CENTRE, "optimiser": {"symmetry": "none"}}, {}, marks=pytest.mark.slow
+        ),
         ({}, {"optimiser": {"symmetry": "none"}}),
         ({}, {"optimiser": {"start": "previous"}}),
     ],

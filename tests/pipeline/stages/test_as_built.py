@@ -19,6 +19,7 @@ SHIELD = (
 BENT = "fabrication: { slots: { direction: centroid } }\n"
 
 
+@pytest.mark.slow
 def test_losses_are_those_of_the_relaxed_structures(tmp_path: Path) -> None:
     source, told = static.write(tmp_path, SHIELD + BENT, 5, 3.0), tmp_path / "built.nc"
     design = static.designed(source)
@@ -37,6 +38,7 @@ def test_losses_are_those_of_the_relaxed_structures(tmp_path: Path) -> None:
     assert np.allclose(start["roi_energy"], 0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_design_with_turned_slots_is_drawn_and_built_as_optimised(tmp_path: Path) -> None:
     source = static.write(tmp_path, SHIELD, 5, 3.0)
     text = source.read_text(encoding="utf-8")

@@ -77,6 +77,7 @@ def page_of(problem: Path, files: dict[str, str], folder: Path) -> str:
     return (folder / "index.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_page_shows_the_worst_load(
     fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -112,7 +113,7 @@ FROM_ABOVE = (
 )
 
 
-@pytest.mark.parametrize("setups", ["", FROM_ABOVE])
+@pytest.mark.parametrize("setups", ["", pytest.param(FROM_ABOVE, marks=pytest.mark.slow)])
 def test_the_page_of_a_path(setups: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ranges = f"target: intact, loads: {{ directions: [170 deg, 190 deg]{setups} }}"
     more = static.HOLE.replace("target: intact", ranges)

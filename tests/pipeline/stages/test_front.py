@@ -25,6 +25,7 @@ def named(path: Path, *names: str) -> list[str]:
     return [f"{name}={file}" for name, file in files.items()]
 
 
+@pytest.mark.slow
 def test_several_designs_under_own_and_worst_loads(
     fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -47,6 +48,7 @@ def test_several_designs_under_own_and_worst_loads(
     assert out.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_the_page_shows_the_certificates_of_the_ends(
     fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

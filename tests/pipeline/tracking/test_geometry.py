@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -52,6 +53,7 @@ def test_a_lens_of_strong_distortion_is_no_outlier_of_the_prior() -> None:
     np.testing.assert_allclose(found.radial, camera.radial, atol=0.01)
 
 
+@pytest.mark.slow
 def test_errors_of_a_lens_are_as_large_as_their_variance_says() -> None:
     """A small specimen in the middle travels to the corner of the picture, and turns on the way."""
     random, ratios = np.random.default_rng(2), []

@@ -55,6 +55,7 @@ def test_a_proposal_leaves_a_recording(tmp_path: Path, capsys: pytest.CaptureFix
     assert "there is a recording already" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_turned_video_is_seen_as_such() -> None:
     """The top row is left out of the picture, so that up and down can be told apart."""
     design = import_video.design(import_video.description(CLIPS / "f_silhouette.yaml"))

@@ -96,6 +96,7 @@ def test_another_design_is_refused(
     assert told in words
 
 
+@pytest.mark.slow
 def test_a_turned_lattice_is_as_told(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A log of another time leaves the track without forces."""
     recording.with_name("load.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")

@@ -46,12 +46,12 @@ def test_threads_change_no_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize(
     ("name", "frames"),
     [
-        ("stick_slip", 24),
+        pytest.param("stick_slip", 24, marks=pytest.mark.slow),
         ("rolling_shutter", 14),
-        ("motion_blur_untold", 14),
-        ("hand", 12),
+        pytest.param("motion_blur_untold", 14, marks=pytest.mark.slow),
+        pytest.param("hand", 12, marks=pytest.mark.slow),
         ("mains_flicker", 24),
-        ("returns_h264", 48),
+        pytest.param("returns_h264", 48, marks=pytest.mark.slow),
     ],
 )
 def test_sigma_holds(name: str, frames: int, tmp_path: Path) -> None:

@@ -282,6 +282,7 @@ def test_absent_units_are_not_in_the_player(smile: StudyResults) -> None:
     assert voided["name"] == "Voided"
 
 
+@pytest.mark.slow
 def test_a_motion_in_time_has_a_report_of_its_own(study: StudyResults, tmp_path: Path) -> None:
     plain = dict(study.datasets)
     del plain["sweep"]

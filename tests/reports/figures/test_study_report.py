@@ -55,6 +55,7 @@ def test_datasets_of_another_problem_are_refused(tmp_path: Path, failing: Failin
     assert "design.nc" in told
 
 
+@pytest.mark.slow
 def test_a_build_that_fails_leaves_the_old_report(
     quick: StudyResults, quick_report: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

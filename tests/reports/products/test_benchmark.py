@@ -129,6 +129,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_the_page_shows_every_picture_with_its_table(folder: Path) -> None:
     page = (folder / "index.html").read_text()
     assert page.count("<svg") == len(GIVEN) + 1  # and the cost of gradients

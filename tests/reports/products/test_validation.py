@@ -73,6 +73,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     return (folder / "index.html").read_text()
 
 
+@pytest.mark.slow
 def test_it_says_who_measured_and_nothing_is_called_synthetic(page: str) -> None:
     assert page.count("Measured at: Bertoldi Group, Harvard University") == 3
     assert page.count("Licence: MIT") == 3
@@ -85,6 +86,7 @@ def test_a_page_of_nothing_is_refused(tmp_path: Path, failing: Failing) -> None:
     assert "give --samples, --cycles or --pictures" in told
 
 
+@pytest.mark.slow
 def test_it_tells_the_errors_and_their_sign(page: str) -> None:
     assert "4.41 mm, -6.68 N to 5.05 mm, -0.07 N" in page
     assert page.count("not simulated") == 2

@@ -46,6 +46,7 @@ def test_jacobian_by_definition(symmetry: structure.Symmetry) -> None:
     np.testing.assert_allclose(jacobian.toarray(), jax.jit(jax.jacobian(plain))(design), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_jacobian_by_difference() -> None:
     design, way = random_design(0.8), random_design(1.0, seed=1)
     slope = central(lambda step: CONSTRAINTS.values(design + step * way), 1e-6)

@@ -73,6 +73,7 @@ def in_two_setups() -> tuple[LoadFamily, Scene]:
     return LoadFamily((PUSHING, mixed)), held
 
 
+@pytest.mark.slow
 def test_a_mixture_is_a_direction_among_two_motions() -> None:
     family, posed = in_two_setups()
     mixed = family.setups[1]
@@ -112,6 +113,7 @@ def test_derivatives_by_the_design_and_by_the_load(family: LoadFamily, posed: ob
     check_derivatives(losses, design, at)
 
 
+@pytest.mark.slow
 def test_imperfect_copies_count_by_their_p_mean() -> None:
     made = scene()
     copies = draw_copies(made.lattice, Perturbation(0.3, 0.1), 2, 0)
@@ -272,6 +274,7 @@ def kill(evaluation: Evaluation) -> None:
         raise KeyboardInterrupt
 
 
+@pytest.mark.slow
 def test_the_worst_loss_is_minimised_and_resumed(tmp_path: Path) -> None:
     """The drive's own loads, at 5 Hz, do not tell of the worst one."""
     with Journal(tmp_path / "j", "key") as journal, pytest.raises(KeyboardInterrupt):

@@ -29,7 +29,14 @@ def solved(known: problems.Known, method: Method = "sqp", **changes: float) -> R
     return minimise(method, known.loss, known.constraints, known.start, known.bounds, options)
 
 
-@pytest.mark.parametrize(("name", "method"), [(n, m) for n, (_, by) in KNOWN.items() for m in by])
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [
+        pytest.param(n, m, marks=[pytest.mark.slow] if (n, m) == ("cantilever", "mma") else [])
+        for n, (_, by) in KNOWN.items()
+        for m in by
+    ],
+)
 def test_known_optima(name: str, method: Method) -> None:
     known, tolerance = KNOWN[name][0], KNOWN[name][1][method]
     found = solved(known, method)
@@ -45,7 +52,8 @@ def test_unconstrained_rosenbrock() -> None:
 
 
 @pytest.mark.parametrize(
-    ("method", "size", "accuracy"), [("sqp", (100, 500), 1e-5), ("mma", (40, 120), 1e-4)]
+    ("method", "size", "accuracy"),
+    [("sqp", (100, 500), 1e-5), pytest.param("mma", (40, 120), 1e-4, marks=pytest.mark.slow)],
 )
 def test_hundreds_of_constraints(method: Method, size: tuple[int, int], accuracy: float) -> None:
     known = problems.many(*size)

@@ -36,7 +36,7 @@ def robust(angles: Floats = ANGLES) -> Scene:
     )
 
 
-@pytest.mark.parametrize("sharpness", [1.0, 8.0])
+@pytest.mark.parametrize("sharpness", [pytest.param(1.0, marks=pytest.mark.slow), 8.0])
 def test_the_evaluator_is_the_derivative_of_the_p_mean_over_copies(sharpness: float) -> None:
     posed = robust(ANGLES[1:2]).updated(copy_sharpness=sharpness)
     evaluate = Evaluator(posed, make_plan(posed))

@@ -70,6 +70,7 @@ def test_the_chosen_steps_agree_with_much_shorter_ones() -> None:
 
 
 @pytest.mark.parametrize(("bias_deg", "share"), [(20.0, 0.5), (40.0, 0.1)], ids=["free", "touch"])
+@pytest.mark.slow
 def test_energy_does_not_drift_in_1e5_steps(bias_deg: float, share: float) -> None:
     """At half the stability limit or more, undamped, after the drive has come to rest.
 

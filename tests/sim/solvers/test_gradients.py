@@ -211,16 +211,22 @@ TOUCHING: Rows = [
 ]
 
 
-def each(rows: Rows) -> pytest.MarkDecorator:
-    cases = [(rig, s, q) for rig, solvers, quantities in rows for s in solvers for q in quantities]
+def each(rows: Rows, *slow: Posed) -> pytest.MarkDecorator:
+    cases = [
+        pytest.param(rig, s, q, marks=[pytest.mark.slow] if rig in slow else [])
+        for rig, solvers, quantities in rows
+        for s in solvers
+        for q in quantities
+    ]
     return pytest.mark.parametrize(("posed", "solver", "quantity"), cases)
 
 
-@each(SMOOTH)
+@each(SMOOTH, structures.shaken, recorded, pulled)
 def test_gradients_without_contact(posed: Posed, solver: str, quantity: str) -> None:
     assert_exact(Ray(posed(), SOLVERS[solver], quantity))
 
 
+@pytest.mark.slow
 def test_equilibria_by_fronts() -> None:
     """30 x 30 squares, whose tangent is no longer stored as a band."""
     rig = structures.squeezed(20.0, side=30)

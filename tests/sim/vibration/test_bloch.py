@@ -40,6 +40,7 @@ def cell() -> UnitCell:
     return made(rotating_squares(6), (2, 2))
 
 
+@pytest.mark.slow
 def test_strain_changes_the_bands_and_keeps_them_real(cell: UnitCell) -> None:
     squeezed = np.diag([-0.03, 0.0])
     relieved = np.diag([0.0, 1.0])
