@@ -39,7 +39,7 @@ def test_a_second_run_is_quick_and_has_nothing_to_do(undisturbed: Checkout) -> N
     """Some three times as long as Snakemake takes to load: seconds would be those of a machine."""
 
     def spent(*words: str) -> tuple[float, str]:
-        """Runs Snakemake; returns seconds of a core, as the clock counts others' work, and words."""
+        """Runs Snakemake; returns seconds of a core and its words."""
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         ended = undisturbed.snakemake(*words)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
