@@ -17,6 +17,9 @@ from sim.energy.system import System, kinematics_of, system_of
 from sim.energy.total import gradient
 from sim.structure import ConcreteParameters, VoidAngleContact
 
+BLOCK = 64
+"""States whose strains are computed at once."""
+
 
 class Observables(NamedTuple):
     """Holds what follows from each state besides its motion.
@@ -72,20 +75,37 @@ def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> O
     reaction = np.full_like(states, np.nan)
     reaction[:, topology.held] = forces[:, topology.held]
     law, voids = topology.contact, topology.smallest_void_angles(values.void, motion)
-    given = (jnp.asarray(part) for part in (values.arm, values.vector, motion))
-    strain = _largest_strains(topology.ligament_units, *given)
+    strain = _largest_strains(topology.ligament_units, values, motion)
     return Observables(
         energies[:, 0],
         energies[:, 1],
         reaction.reshape(motion.shape),
         voids.min(axis=1, initial=np.pi),
         (voids < law.cutoff_angle).sum(axis=1) if isinstance(law, VoidAngleContact) else near,
-        *(np.asarray(part) for part in strain),
+        *strain,
     )
 
 
-@jax.jit
 def _largest_strains(
+    ligament_units: Ints, values: ConcreteParameters, motion: Floats
+) -> tuple[Floats, ...]:
+    """Computes the largest strains (n_states,) of `LigamentStrain`, a block of states at a time.
+
+    So they are compiled for a structure, not for each number of its states.
+    """
+    found = np.empty((len(LigamentStrain._fields), len(motion)))
+    arm, vector = jnp.asarray(values.arm), jnp.asarray(values.vector)
+    for first in range(0, len(motion), BLOCK):
+        block = motion[first : first + BLOCK]
+        padded = np.zeros((BLOCK, *motion.shape[1:]))
+        padded[: len(block)] = block
+        strains = _strains_of_block(ligament_units, arm, vector, padded)
+        found[:, first : first + BLOCK] = np.stack(strains)[:, : len(block)]
+    return tuple(found)
+
+
+@jax.jit
+def _strains_of_block(
     ligament_units: Ints, arm: Array, vector: Array, motion: Array
 ) -> LigamentStrain:
     """Largest magnitudes (n_states,) over the ligaments; the stretch relative to the length."""

@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -16,11 +17,12 @@ from sim.energy import (
     contact_energy,
     ligament_energy,
     ligament_kernels,
+    observables,
     topology,
     void_contact_kernels,
 )
 from sim.energy.network_arrays import Kinematics, NetworkArrays
-from sim.energy.observables import observe
+from sim.energy.observables import BLOCK, observe
 from sim.scene import concrete_parameters
 from sim.structure import Lattice, VoidAngleContact, shape
 from tests.sim.reference_scenes import compressed, reference
@@ -157,3 +159,19 @@ def test_observables_are_those_of_each_state() -> None:
     assert seen.contact_pairs[2] > 0
     assert np.isfinite(seen.reaction[:, 0]).all()
     assert np.isnan(seen.reaction[:, 1:]).all()
+
+
+@pytest.mark.parametrize("n_states", [1, BLOCK, BLOCK + 1])
+def test_a_state_is_observed_the_same_among_any_number(n_states: int) -> None:
+    """And no other number of them compiles anything anew."""
+    lattice = rotating_squares()
+    top = topology(lattice, NONE, VoidAngleContact(BARRIER, CUTOFF))
+    motion = np.random.default_rng(2).normal(0.0, 0.05, (n_states, lattice.n_units, 3))
+    found = observe(top, at_rest(lattice), motion)
+    alone = observe(top, at_rest(lattice), motion[-1:])
+    for all_states, last in zip(found, alone, strict=True):
+        np.testing.assert_array_equal(np.asarray(all_states)[-1:], last)
+    strains: Any = observables._strains_of_block
+    compiled = strains._cache_size()
+    observe(top, at_rest(lattice), np.zeros((n_states + 3, lattice.n_units, 3)))
+    assert strains._cache_size() == compiled
