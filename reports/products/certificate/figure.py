@@ -68,8 +68,11 @@ class CertifiedDesign:
 
     @property
     def axes(self) -> tuple[str, str]:
-        """Names the axis of the map beside the amplitude, and that of the scatter."""
-        return ("frequency", "direction") if self.harmonic else ("direction", "amplitude")
+        """Names the axis of the map beside the amplitude, and that of the scatter, which varies."""
+        across = "frequency" if self.harmonic else "direction"
+        order = ("direction", "amplitude") if self.harmonic else ("amplitude", "direction")
+        varied = [name for name in order if np.ptp(self.data[f"load_{name}"].values) > 0.0]
+        return across, (varied or order)[0]
 
     @cached_property
     def size(self) -> xr.DataArray:
@@ -78,10 +81,21 @@ class CertifiedDesign:
         moved = self.worst.response["displacement"].isel(case=0)
         return _magnitude(moved, spacing)
 
+    @property
+    def by_energy(self) -> bool:
+        """Tells whether the loss is one of the region's energy."""
+        return self.worst.problem.objective.kind == "strain_energy"
+
     @cached_property
     def missed(self) -> xr.DataArray:
-        """Returns the root mean square (structure, time) of what is missed in the region."""
+        """Returns what is missed in the region (structure, time), as the loss counts it.
+
+        That is the region's energy, N mm, or the root mean square of displacements in spacings.
+        """
         response, problem = self.worst.response, self.worst.problem
+        if self.by_energy:
+            energy: xr.DataArray = response["roi_energy"].isel(case=0)
+            return energy
         moved = response["displacement"].isel(case=0)
         if problem.objective.target == "intact":
             moved = moved - moved.sel(structure="intact")
@@ -100,7 +114,8 @@ def _magnitude(moved: xr.DataArray, spacing: float) -> xr.DataArray:
 def certificate_figure(found: CertifiedDesign) -> PanelFigure:
     """Returns the whole figure."""
     data = found.data
-    missed_words = _PROSE["missed"][found.worst.problem.objective.target]
+    measure = "energy" if found.by_energy else found.worst.problem.objective.target
+    missed_words = _PROSE["missed"][measure]
     words = {"loads": data.sizes["load"], "along": found.axes[1], "missed": missed_words}
 
     def losses(figure: Figure) -> None:
@@ -280,8 +295,8 @@ def _missed(axes: Axes, found: CertifiedDesign) -> None:
         values = missed.sel(structure=name)
         axes.plot(missed["time"], values, color=colour, label=name.capitalize(), lw=1.0)
     mimics = found.worst.problem.objective.target == "intact"
-    missed_words = r"\mathbf{U}-\mathbf{U}^*" if mimics else r"\mathbf{U}"
-    axes.set(xlabel="$t$ (s)", ylabel=f"rms of $\\|{missed_words}\\|$")
+    size = r"rms of $\|\mathbf{U}-\mathbf{U}^*\|$" if mimics else r"rms of $\|\mathbf{U}\|$"
+    axes.set(xlabel="$t$ (s)", ylabel="region's energy (N mm)" if found.by_energy else size)
     axes.set_xlim(0.0, float(missed["time"][-1]))
     axes.set_ylim(bottom=0.0)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, columnspacing=0.8)

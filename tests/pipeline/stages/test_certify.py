@@ -124,6 +124,27 @@ def test_the_page_of_a_path(setups: str, tmp_path: Path, monkeypatch: pytest.Mon
     assert 'id="player-data"' in text
 
 
+@pytest.mark.slow
+def test_the_page_of_an_energy_shows_that(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    more = """
+cloak: { ring: { inner: 8 mm, outer: 24 mm } }
+objective:
+  kind: strain_energy
+  target: rest
+  region: { disc: { radius: 8 mm } }
+  loads: { directions: [170 deg, 190 deg] }
+"""
+    path, page = static.write(tmp_path, more, size=5, amplitude=3.0), tmp_path / "page"
+    files = certified(path, tmp_path, monkeypatch)
+    assert "Strain energy of the region of interest under the worst load" in page_of(
+        path, files, page
+    )
+    response = datasets.read(Path(files["--response"]), "response").isel(case=0)
+    table = pd.read_csv(page / "worst_load.csv", comment="#")
+    energy = response["roi_energy"].sel(structure="cloaked")
+    np.testing.assert_allclose(table["missed_cloaked"], energy, rtol=1e-6, atol=1e-12)
+
+
 def test_only_loads_in_ranges_are_certified(fig2: Path, tmp_path: Path, failing: Failing) -> None:
     words = ["--problem", str(fig2), "--design", "d.nc", "--out", str(tmp_path / "c.nc")]
     assert "objective.loads" in failing("certify", words)
