@@ -33,6 +33,8 @@ _PROSE = prose(__file__)
 _COLOURS = {"cloaked": style.CLOAKED, "study": style.GREY}
 _NAMES = {"cloaked": "this design", "study": "the study's own"}
 _AXES = {"frequency": "frequency (Hz)", "amplitude": "amplitude (mm)", "direction": "direction (°)"}
+_TURN = 45.0
+"""Between ticks of directions, where these span more, degrees."""
 _UNIT_TINT = "#c3c7cc"
 _MARKERS = "os^Dv"
 """Of the loads in each set-up."""
@@ -265,8 +267,8 @@ def _scatter(axes: Axes, found: CertifiedDesign) -> None:
         )  # fmt: skip
     axes.set(xlabel=_AXES[along], ylabel=_label(found.data))
     axes.set_ylim(bottom=0.0)
-    if along == "direction":
-        axes.xaxis.set_major_locator(MultipleLocator(45.0))
+    if along == "direction" and np.ptp(axes.get_xlim()) > 2 * _TURN:
+        axes.xaxis.set_major_locator(MultipleLocator(_TURN))
 
 
 def _peaks(figure: Figure, found: CertifiedDesign) -> None:
