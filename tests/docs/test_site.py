@@ -38,16 +38,14 @@ FOLDER = ROOT / "docs/examples"
 PINNED: dict[str, dict[str, float]] = tables("docs")["examples"]
 NAMES = sorted(p.stem for p in FOLDER.glob("*.py") if p.stem not in ("render", "specimen"))
 SLOW = ("hidden_void", "resumed_run", "robust_design", "shielding_cloak", "track_video")
-"""Examples that take eight seconds and more: tests/slow runs them."""
+"""Examples that take eight seconds and more."""
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in SLOW])
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.slow] if n in SLOW else []) for n in NAMES],
+)
 def test_an_example_gives_its_numbers(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    check_numbers(name, monkeypatch)
-
-
-def check_numbers(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs an example, and compares its numbers with those pinned."""
     monkeypatch.setattr(sys, "path", [str(FOLDER), *sys.path])
     made = runpy.run_path(str(FOLDER / f"{name}.py"))
     found = {key: float(made[key]) for key in PINNED[name]}

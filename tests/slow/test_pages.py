@@ -7,7 +7,6 @@ import pytest
 
 from pipeline.problem.reading import load, preset_names
 from tests.docs.pages import PLACE, WALKED, text
-from tests.docs.test_site import SLOW, check_numbers
 from tests.docs.walk import Reader
 
 
@@ -60,8 +59,3 @@ def test_the_tutorials(tmp_path: Path) -> None:
     assert (root / "dots.pdf").read_bytes().startswith(b"%PDF")
     assert (root / "results/logo/report/index.html").is_file()
     assert (root / "results/logo/recordings/rehearsal/track.nc").is_file()
-
-
-@pytest.mark.parametrize("name", SLOW)
-def test_optimising_examples_give_their_numbers(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    check_numbers(name, monkeypatch)

@@ -1,7 +1,6 @@
 """Heavy clips of the tracker: dots and speckle against truth, and long recordings."""
 
 import tracemalloc
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,9 +10,7 @@ from pipeline.tracking.frames import Frame, import_video, read_frames
 from pipeline.tracking.geometry import outlines_of_design
 from pipeline.tracking.motion import track_video
 from pipeline.tracking.motion.tracker import TrackedFrame, Tracker
-from tests.pipeline.tracking import test_wild_clips
 from tests.pipeline.tracking.conftest import CLIPS, check_accuracy, tracked
-from tests.tables import cases
 
 _KEPT = 4 * 225 * 8  # bytes of poses, uncertainties and seen shares, single precision
 
@@ -48,11 +45,6 @@ def test_speckled_units_agree_with_an_independent_correlation() -> None:
         middle = camera.project(rest) - (column - half, row - half)
         apart.append(warp[:, :2] @ middle + warp[:, 2] - camera.project(moved))
     assert np.sqrt(np.mean(np.square(apart))) < 0.05
-
-
-@cases("tracking", "name, frames, rms, lost")
-def test_nothing_is_wrong(name: str, frames: int, rms: float, lost: float, tmp_path: Path) -> None:
-    test_wild_clips.test_no_unit_is_wrong(name, frames, rms, lost, tmp_path)
 
 
 def _looped(monkeypatch: pytest.MonkeyPatch, length: int) -> int:

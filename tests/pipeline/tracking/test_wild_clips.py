@@ -15,7 +15,7 @@ from pipeline.tracking.fit import frame_fit
 from pipeline.tracking.motion import Track, track_video
 from pipeline.tracking.reference_frame import RecordingSetup
 from sim.core import Floats, Mask, Singles
-from tests.tables import cases
+from tests.tables import cases, tables
 
 
 def shown(name: str, folder: Path, frames: int) -> tuple[WildClip, Track]:
@@ -23,7 +23,10 @@ def shown(name: str, folder: Path, frames: int) -> tuple[WildClip, Track]:
     return clip, tracked(clip)
 
 
-@cases("tracking", "name, frames, rms, lost")
+HEAVY = [pytest.param(*row, marks=pytest.mark.slow) for row in tables("tracking")["heavy_clips"]]
+
+
+@cases("tracking", "name, frames, rms, lost", *HEAVY)
 def test_no_unit_is_wrong(name: str, frames: int, rms: float, lost: float, tmp_path: Path) -> None:
     """Or called good where it is."""
     clip, track = shown(name, tmp_path, frames)
