@@ -10,7 +10,8 @@ of which the part by the state goes on to the parameters through the equilibrium
 import numpy as np
 import scipy.sparse.linalg as spla
 
-from sim.core import Floats, SimulationError
+from sim.collision import raise_new_pairs
+from sim.core import Floats, NewContactPairs, SimulationError
 from sim.energy import (
     System,
     Topology,
@@ -40,10 +41,13 @@ def lowest_eigenpair(system: System, state: Floats) -> tuple[float, Floats]:
     `state` (n_dofs,) is a stable equilibrium; the system's scale makes rotations lengths.
 
     Raises:
+        NewContactPairs: units are near whose coupling the tangent has no room for.
         SimulationError: the state is not stable.
     """
     work, scale = workspace(system), system.scale[system.dofs]
-    if not factorise_tangent(state, system, work, 0.0, np.zeros(4, dtype=np.int64)):
+    stable = factorise_tangent(state, system, work, 0.0, np.zeros(4, dtype=np.int64))
+    raise_new_pairs(system.contacts)
+    if not stable:
         raise SimulationError("an equilibrium is not a minimum of the energy")
 
     def product(x: Floats) -> Floats:
@@ -69,6 +73,15 @@ def eigenvalue_and_slopes(
     Raises:
         SimulationError: the state is not stable.
     """
+    try:
+        return _value_and_slopes(topology, values, state)
+    except NewContactPairs as met:
+        return eigenvalue_and_slopes(topology.coupling(met.pairs), values, state)
+
+
+def _value_and_slopes(
+    topology: Topology, values: ConcreteParameters, state: Floats
+) -> tuple[float, ConcreteParameters]:
     system = system_of(topology, values)
     value, mode = lowest_eigenpair(system, state)
     bars = empty_bars(system, (1, len(system.held)))
@@ -81,4 +94,5 @@ def eigenvalue_and_slopes(
         hessian_product(moved, system, kinematics, direction, product)
         bar += product
     adjoint(state[None], bar[None], system, workspace(system), topology.designed, bars)
+    raise_new_pairs(system.contacts)
     return value, as_values(bars, topology.n_units)

@@ -154,6 +154,7 @@ class StaticSolver:
         system = system_of(top, values)
         bars = empty_bars(system, (len(record.states), len(top.held)))
         unstable = adjoint(record.states, bar_u, system, workspace(system), top.designed, bars)
+        raise_new_pairs(system.contacts)
         if unstable >= 0:
             raise SimulationError(
                 f"the equilibrium at load {unstable} is not a minimum of the energy, so it has no"

@@ -134,7 +134,11 @@ class Solver(Protocol):
     def backward(
         self, values: ConcreteParameters, record: Any, bar_u: Floats, bar_v: Floats
     ) -> tuple[ConcreteParameters, Floats, Floats]:
-        """Loss derivatives by the parameters, and by the drive at the times also returned."""
+        """Loss derivatives by the parameters, and by the drive at the times also returned.
+
+        Raises:
+            NewContactPairs: units are near whose coupling the record's topology has no room for.
+        """
         ...
 
 
@@ -225,8 +229,8 @@ def adjoint_cases(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats
     # copies, as jax's arrays are read only: loops would be compiled once more for these
     flat_u, flat_v = (_with_loads(solver.topology, bar) for bar in (bar_u, bar_v))
     results = _spread(
-        lambda case: solver.backward(
-            records.values, records.records[case], flat_u[case], flat_v[case]
+        lambda case: _sweep_back(
+            solver, records.values, records.records[case], flat_u[case], flat_v[case]
         ),
         range(len(flat_u)),
         solver.threads,
@@ -234,6 +238,21 @@ def adjoint_cases(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats
     parts, times, drive = zip(*results, strict=True)
     summed = ConcreteParameters(*(np.asarray(sum(part)) for part in zip(*parts, strict=True)))
     return Gradients(summed, list(times), list(drive))
+
+
+def _sweep_back(
+    solver: Solver, values: ConcreteParameters, record: Any, bar_u: Floats, bar_v: Floats
+) -> tuple[ConcreteParameters, Floats, Floats]:
+    """Sweeps back through one case.
+
+    The broad phase looks at other states than on the way forward, and may find pairs near that were
+    not: their coupling gets room.
+    """
+    try:
+        return solver.backward(values, record, bar_u, bar_v)
+    except NewContactPairs as met:
+        roomier = replace(record, topology=record.topology.coupling(met.pairs))
+        return _sweep_back(solver, values, roomier, bar_u, bar_v)
 
 
 def _with_loads(topology: Topology, bar: Floats) -> Floats:

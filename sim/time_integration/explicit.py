@@ -146,6 +146,7 @@ class ExplicitSolver:
             steps, outputs, system, workspace(system), self._watched, record.checkpoints, bar_u,
             bar_v, top.designed, bars, bar_decay, bar_gain,
         )  # fmt: skip
+        raise_new_pairs(system.contacts)
         lengths = self.splitting.kicks * steps.h
         by_mass, by_damping = _kicks_transposed(system, lengths, steps, bar_decay, bar_gain)
         bars.mass[:] += by_mass

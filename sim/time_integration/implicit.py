@@ -156,6 +156,7 @@ class ImplicitSolver:
             top.designed,
             bars,
         )
+        raise_new_pairs(system.contacts)
         if not positive:
             raise SimulationError(
                 "a stage's tangent is indefinite in the adjoint; try shorter steps"

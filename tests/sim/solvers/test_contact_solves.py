@@ -9,8 +9,8 @@ import pytest
 from sim.collision import CandidatePairs
 from sim.core import Floats, SimulationError
 from sim.energy import observe
-from sim.quasistatics import StaticSolver
-from sim.solvers import LinearRamp, Solver, solve_case
+from sim.quasistatics import StaticSolver, eigenvalue_and_slopes
+from sim.solvers import LinearRamp, Records, Solver, adjoint_cases, solve_case, solve_cases
 from sim.structure import clearance, close_pairs, displaced
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 from tests.sim.solvers.test_gradients import Ray, assert_exact_in_contact
@@ -110,6 +110,41 @@ def test_units_meet_that_were_far_apart_at_rest() -> None:
     states = path(rig, StaticSolver(rig.topology, np.linspace(0.25, 1.0, 4)))
     assert_clear_in_contact(rig, states)
     assert states[-1, 1, 0] < -0.4
+
+
+@pytest.mark.parametrize("kind", ["static", *DYNAMIC])
+def test_a_sweep_back_makes_room_for_pairs_that_it_alone_finds_near(kind: str) -> None:
+    """The broad phase looks at other states on the way back; a pair without room has no contact."""
+    if kind == "static":
+        rig = far_apart(32.5)
+        solver: Solver = StaticSolver(rig.topology, np.linspace(0.25, 1.0, 4))
+        without = rig.topology
+    else:
+        rig = shaken(bias_deg=44.0, distance=DISTANCE)
+        solver, contact = DYNAMIC[kind](rig), rig.topology.contact
+        assert isinstance(contact, CandidatePairs)
+        without = replace(rig.topology, contact=replace(contact, pairs=contact.pairs[:1]))
+    cases = [rig.drive]
+    motion, velocity, records = solve_cases(solver, rig.values, cases)
+    bars = np.ones_like(motion), np.zeros_like(velocity)
+    known = adjoint_cases(solver, records, *bars)
+    bare = [replace(record, topology=without) for record in records.records]
+    found = adjoint_cases(solver, Records(rig.values, cases, bare), *bars)
+    assert np.abs(known.parameters.corner).max() > 0.0
+    for one, other in zip(known.parameters, found.parameters, strict=True):
+        np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())
+
+
+def test_an_eigenvalue_counts_contact_of_pairs_that_were_far_apart() -> None:
+    rig = far_apart(32.5)
+    solver = StaticSolver(rig.topology, np.linspace(0.25, 1.0, 4))
+    record = solve_case(solver, rig.values, rig.drive)[2]
+    roomy, bare = (
+        eigenvalue_and_slopes(topology, rig.values, record.states[-1])
+        for topology in (record.topology, rig.topology)
+    )
+    assert bare[0] == pytest.approx(roomy[0], rel=1e-9)
+    assert roomy[0] == pytest.approx(record.eigenvalue[-1], rel=1e-4)
 
 
 @pytest.mark.parametrize("solver", DYNAMIC)
