@@ -1,3 +1,4 @@
+from .feasibility import feasible_design as feasible_design
 from .journal import Journal as Journal
 from .journal import JournalInUseError as JournalInUseError
 from .kkt import stationarity as stationarity

@@ -3,7 +3,12 @@
 import numpy as np
 
 from sim.core import Floats, SimulationError
-from sim.optimise.problem import ConstraintPoint, CountedProblem, InfeasibleStartError
+from sim.optimise.problem import (
+    Constrain,
+    ConstraintPoint,
+    CountedProblem,
+    InfeasibleStartError,
+)
 from sim.optimise.qp import reachable, shortest_step
 
 INSET = 1e-7
@@ -63,6 +68,17 @@ def retreat(
             break
         place = deeper
     return place
+
+
+def feasible_design(constrain: Constrain, x: Floats, reach: float, rounds: int) -> Floats | None:
+    """Projects a design vector on the feasible set; None if no round leads there."""
+    anywhere = np.full(len(x), np.inf)
+    place = project(CountedProblem(_no_loss, constrain, -anywhere, anywhere, 0), x, reach, rounds)
+    return None if place is None else place.x
+
+
+def _no_loss(design: Floats) -> tuple[float, Floats, Floats]:
+    return 0.0, np.zeros_like(design), np.zeros(0)
 
 
 def feasible_start(problem: CountedProblem, x: Floats, reach: float) -> ConstraintPoint:

@@ -228,13 +228,13 @@ class CountedProblem:
                 break
             try:
                 loss, gradient, aux = self.confirm(each.x.copy())
+                place = self.place(each.x)  # constraints may have learnt since
             except SimulationError as failure:
                 log.warning("evaluation %d is not confirmed: %s", each.number, failure)
                 continue
             if abs(loss - each.loss) > CONFIRMED * abs(each.loss):
                 log.warning("evaluation %d is not confirmed: its loss is %.5g", each.number, loss)
-            if found is None or (each.violation, loss) < (found.violation, found.loss):
-                place = self.place(each.x)
+            if found is None or (place.violation, loss) < (found.violation, found.loss):
                 found = EvaluatedPoint(
                     place.x, place.values, place.jacobian, each.number, loss, gradient, aux
                 )

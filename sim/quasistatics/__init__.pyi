@@ -7,5 +7,7 @@ from .eigenvalue import eigenvalue_and_slopes as eigenvalue_and_slopes
 from .eigenvalue import lowest_eigenpair as lowest_eigenpair
 from .equilibrium_path import BRANCHING as BRANCHING
 from .equilibrium_path import LIMIT_POINT as LIMIT_POINT
+from .softness import SoftestPoint as SoftestPoint
+from .softness import softest_point as softest_point
 from .static_solver import StaticRecord as StaticRecord
 from .static_solver import StaticSolver as StaticSolver

@@ -9,6 +9,7 @@ t being the path's tangent at the point before, is regular in a limit point too 
 Solids Struct. 15, 529). Beyond it equilibria are unstable until the path turns forward again.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -29,10 +30,12 @@ FIRST_LENGTH, LONGEST, SHORTEST = 0.05, 2.0, 1e-6
 """Arc length of a step, in mm of the root of the summed squares of all dofs."""
 CROOKED = 0.05
 """Departure of a step from the trapezoidal rule at most, over its length."""
-CORRECTIONS, FAST = 8, 4
+CORRECTIONS, FAST = 12, 6
 """Newton steps of a point at most, and those up to which the next step is longer."""
 BALANCED = 1e-9
 """Newton step at which a point counts as found, mm."""
+SLOW = 0.2
+"""Share of the last Newton step above which the next is made by the tangent there."""
 PAST = 1e-6
 """Share of its load by which a path may pass the snap that it turns at."""
 FEW = 20
@@ -107,23 +110,8 @@ def _trace(
     topology: Topology, values: ConcreteParameters, drive: PrescribedMotion,
     start: tuple[float, Floats], end: float, points: int, longest: float,
 ) -> EquilibriumTrace:  # fmt: skip
-    path = _Path(topology, values, drive)
-    point = path.point(*start)
-    ahead = path.tangent(point, np.append(np.zeros(topology.n_free), 1.0))
-    found, length = [point], FIRST_LENGTH
-    while (
-        ahead is not None and len(found) < points and length > SHORTEST and 0.0 <= point.load <= end
-    ):
-        after, fast = path.correct(point, ahead, length)
-        turned = None if after is None else path.tangent(after, ahead)
-        if after is None or turned is None or path.crooked(point, after, ahead + turned) > CROOKED:
-            length *= 0.5
-            continue
-        if ahead[-1] * turned[-1] < 0.0:
-            found.append(path.turn(point, ahead, length))
-        length = min(longest, 1.5 * length) if fast else length
-        point, ahead = after, turned
-        found.append(point)
+    path = ArcLengthPath(topology, values, drive)
+    found = list(path.points(start, end, points, longest))
     eigenvalue, falling = zip(*map(path.stability, found), strict=True)
     raise_new_pairs(path.system.contacts)
     return EquilibriumTrace(
@@ -134,12 +122,55 @@ def _trace(
     )
 
 
-class _Point(NamedTuple):
-    load: float
-    state: Floats
+class PathPoint(NamedTuple):
+    """Holds one equilibrium of a path."""
+
+    load: float  # load parameter
+    state: Floats  # (n_dofs,)
 
 
-class _Path:
+class Tangent:
+    """Holds the scaled tangent K (n_free, n_free) of a point, stable or not, and its factor.
+
+    `load` (n_free,) is the force f of the held dofs' way.
+
+    Raises:
+        RuntimeError: K is singular.
+    """
+
+    def __init__(self, stiffness: sp.csc_array, load: Floats) -> None:
+        self.stiffness, self.size, self._load = stiffness, len(load), load
+        # without pivoting the signs of the pivots are those of the eigenvalues
+        self._factor = spla.splu(
+            stiffness, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+        self.falling = int((self._factor.U.diagonal() < 0.0).sum())
+        self._across = self._factor.solve(load)
+
+    def solve(self, right: Floats, ahead: Floats) -> Floats:
+        """Solves [K f; t] y = right (n_free + 1,), t the direction ahead."""
+        # y = y1 - a K^-1 f with K y1 = r and t . y + t_a a = r_a
+        free = self._factor.solve(right[:-1])
+        way = (right[-1] - ahead[:-1] @ free) / (ahead[-1] - ahead[:-1] @ self._across)
+        return np.append(free - way * self._across, way)
+
+    def solve_transposed(self, right: Floats, ahead: Floats) -> Floats:
+        """Solves [K t; f] y = right (n_free + 1,)."""
+        free, along = self._factor.solve(right[:-1]), self._factor.solve(ahead[:-1])
+        way = (right[-1] - self._load @ free) / (ahead[-1] - self._load @ along)
+        return np.append(free - way * along, way)
+
+    def lowest(self, count: int) -> tuple[Floats, Floats]:
+        """Finds the smallest eigenvalue, or so many negative ones, from zero down; and modes."""
+        inverse = spla.LinearOperator(
+            (self.size, self.size), matvec=self._factor.solve, dtype=float
+        )
+        start = np.sin(1.0 + np.arange(self.size))
+        found, modes = spla.eigsh(inverse, count, which="SA" if self.falling else "LA", v0=start)
+        return 1.0 / found, modes
+
+
+class ArcLengthPath:
     """Evaluates balance and tangent of a structure along its drive."""
 
     def __init__(
@@ -147,103 +178,162 @@ class _Path:
     ) -> None:
         self.system: System = system_of(topology, values)
         self._drive, self._work = drive, workspace(self.system)
-        self._tangent, self._scale = WholeTangent(topology, values), topology.scale
+        self._tangent = WholeTangent(topology, values)
         self._n_moving = 3 * topology.n_units
-        self._held, self._free = topology.held, np.sort(topology.free_dofs)
+        self._last: tuple[PathPoint, Tangent] | None = None
+        self._held, self.free = topology.held, np.sort(topology.free_dofs)
+        self.scale, self._scale = topology.scale[self.free], topology.scale
 
-    def point(self, load: float, state: Floats) -> _Point:
+    def points(
+        self,
+        start: tuple[float, Floats],
+        end: float,
+        most: int,
+        longest: float = LONGEST,
+        turns: bool = True,
+    ) -> Iterator[PathPoint]:
+        """Goes along the path forward from a stable equilibrium, ``most`` points at most.
+
+        With ``turns``, the points at which it turns are among them. It ends where its load passes
+        ``end`` or falls below that of rest, or where no step leads on.
+        """
+        point, length, number = self.point(*start), FIRST_LENGTH, 1
+        ahead = self.direction(point, np.append(np.zeros(len(self.free)), 1.0))
+        yield point
+        while (
+            ahead is not None and number < most and length > SHORTEST and 0.0 <= point.load <= end
+        ):
+            after, fast = self.correct(point, ahead, length)
+            turned = None if after is None else self.direction(after, ahead)
+            if (
+                after is None
+                or turned is None
+                or self.crooked(point, after, ahead + turned) > CROOKED
+            ):
+                length *= 0.5
+                continue
+            if turns and ahead[-1] * turned[-1] < 0.0:
+                yield self.turn(point, ahead, length)
+            length = min(longest, 1.5 * length) if fast else length
+            point, ahead, number = after, turned, number + 1
+            yield point
+
+    def point(self, load: float, state: Floats) -> PathPoint:
         """Places the held dofs of a state where the drive has them."""
         placed = np.array(state, dtype=float)
         placed[self._held] = self._drive.values(self._held, np.array([load]))[0]
-        return _Point(load, placed)
+        return PathPoint(load, placed)
 
-    def correct(self, begin: _Point, ahead: Floats, length: float) -> tuple[_Point | None, bool]:
-        """Finds the equilibrium an arc length ahead; tells whether it was found fast."""
-        pace = self._pace(begin.load)
-        step = length * ahead
+    def correct(
+        self, begin: PathPoint, ahead: Floats, length: float, near: "Tangent | None" = None
+    ) -> tuple[PathPoint | None, bool]:
+        """Finds the equilibrium an arc length ahead; tells whether it was found fast.
+
+        The tangent ``near``, by default that at the beginning, serves as long as it leads on well.
+        """
+        pace, step, before = self._pace(begin.load), length * ahead, float(np.inf)
+        tangent = near or self.tangent_at(begin)
         for number in range(CORRECTIONS):
             state = begin.state.copy()
-            state[self._free] += step[:-1] / self._scale[self._free]
+            state[self.free] += step[:-1] / self.scale
             point = self.point(begin.load + step[-1] / pace, state)
             residual = np.append(self._force(point), ahead @ step - length)
-            if not np.isfinite(residual).all():
+            if tangent is None or not np.isfinite(residual).all():
                 return None, False
-            change = self._solved(point, ahead, -residual, pace)
-            if change is None or np.linalg.norm(change) > 2.0 * length:
+            change = tangent.solve(-residual, ahead)
+            if np.linalg.norm(change) > SLOW * before:
+                tangent = self.tangent_at(point)
+                if tangent is None:
+                    return None, False
+                change = tangent.solve(-residual, ahead)
+            before = float(np.linalg.norm(change))
+            if not before <= 2.0 * length:
                 return None, False
             step += change
-            if np.linalg.norm(change) < BALANCED:
+            if before < BALANCED:
                 return point, number < FAST
         return None, False
 
-    def tangent(self, point: _Point, before: Floats) -> Floats | None:
+    def direction(self, point: PathPoint, before: Floats) -> Floats | None:
         """Returns the unit tangent (n_free + 1,) of the path, in the sense of the one before."""
-        right = np.append(np.zeros(len(self._free)), 1.0)
-        found = self._solved(point, before, right, self._pace(point.load))
-        return None if found is None else found / np.linalg.norm(found)
+        tangent = self.tangent_at(point)
+        if tangent is None:
+            return None
+        found = tangent.solve(np.append(np.zeros(len(self.free)), 1.0), before)
+        return found / np.linalg.norm(found)
 
-    def crooked(self, begin: _Point, after: _Point, mean: Floats) -> float:
+    def step(self, begin: PathPoint, after: PathPoint) -> Floats:
+        """Returns the scaled way (n_free + 1,) between two points, mm."""
+        moved = (after.state - begin.state)[self.free] * self.scale
+        return np.append(moved, (after.load - begin.load) * self._pace(begin.load))
+
+    def crooked(self, begin: PathPoint, after: PathPoint, mean: Floats) -> float:
         """Compares a step with the trapezoidal rule along twice the mean of its ends' tangents."""
-        moved = (after.state - begin.state)[self._free] * self._scale[self._free]
-        step = np.append(moved, (after.load - begin.load) * self._pace(begin.load))
+        step = self.step(begin, after)
         # x1 - x0 = ds (t0 + t1) / 2
         along = mean / np.linalg.norm(mean)
         return float(np.linalg.norm(step - (along @ step) * along) / np.linalg.norm(step))
 
-    def turn(self, begin: _Point, ahead: Floats, length: float) -> _Point:
+    def turn(self, begin: PathPoint, ahead: Floats, length: float) -> PathPoint:
         """Finds the point within an arc length at which the load does not change."""
 
         def forward(share: float) -> float:
             point = self.correct(begin, ahead, share * length)[0] if share else begin
-            turned = None if point is None else self.tangent(point, ahead)
+            turned = None if point is None else self.direction(point, ahead)
             return -float(ahead[-1]) if turned is None else float(turned[-1])
 
         share = brentq(forward, 0.0, 1.0, xtol=1e-9, disp=False)
         return self.correct(begin, ahead, share * length)[0] or begin
 
-    def stability(self, point: _Point) -> tuple[float, int]:
+    def chord(self, begin: PathPoint, after: PathPoint) -> Floats:
+        """Returns the direction (n_free + 1,) from one point to another."""
+        step = self.step(begin, after)
+        return step / np.linalg.norm(step)
+
+    def stability(self, point: PathPoint) -> tuple[float, int]:
         """Returns the smallest eigenvalue, or the last negative one, and how many are negative."""
-        stiffness = self._stiffness(point)
-        factor = spla.splu(
-            stiffness, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
-        size, falling = len(self._free), int((factor.U.diagonal() < 0.0).sum())
-        if size < FEW:
-            return float(np.linalg.eigvalsh(stiffness.toarray())[0]), falling
-        inverse = spla.LinearOperator((size, size), matvec=factor.solve, dtype=float)
-        of_inverse = spla.eigsh(
-            inverse, 1, which="SA" if falling else "LA", v0=np.sin(1.0 + np.arange(size)),
-            return_eigenvectors=False,
-        )  # fmt: skip
-        return float(1.0 / of_inverse[0]), falling
+        tangent = self.tangent_at(point)
+        if tangent is None:
+            return 0.0, 0
+        if tangent.size < FEW:
+            return float(np.linalg.eigvalsh(tangent.stiffness.toarray())[0]), tangent.falling
+        return float(tangent.lowest(1)[0][0]), tangent.falling
+
+    def tangent_at(self, point: PathPoint) -> "Tangent | None":
+        """Factorises the tangent at a point; None if it is singular."""
+        if self._last is None or self._last[0] is not point:
+            way, along = self.way(point), np.empty_like(point.state)
+            locate(point.state, self.system, self._work.kinematics)
+            hessian_product(point.state, self.system, self._work.kinematics, way, along)
+            try:
+                found = Tangent(self.stiffness(point), along[self.free] / self.scale)
+            except RuntimeError:
+                return None
+            self._last = point, found
+        return self._last[1]
+
+    def way(self, point: PathPoint) -> Floats:
+        """Returns the motion (n_dofs,) of the held dofs by a mm of their way."""
+        found = np.zeros_like(point.state)
+        found[self._held], pace = self._rates(point.load)
+        return found / pace
 
     def _pace(self, load: float) -> float:
         """Returns the way of the held dofs over the load parameter, mm."""
+        return self._rates(load)[1]
+
+    def _rates(self, load: float) -> tuple[Floats, float]:
+        """Returns the rates (n_held,) of the held dofs, and the norm of them, mm."""
         rates = self._drive.rates(self._held, np.array([load]))[0]
-        return max(float(np.linalg.norm(rates * self._scale[self._held])), 1e-12)
+        return rates, max(float(np.linalg.norm(rates * self._scale[self._held])), 1e-12)
 
-    def _force(self, point: _Point) -> Floats:
+    def _force(self, point: PathPoint) -> Floats:
         gradient(point.state, self.system, self._work.kinematics, self._work.force)
-        return np.asarray(self._work.force[self._free] / self._scale[self._free])
+        return np.asarray(self._work.force[self.free] / self.scale)
 
-    def _stiffness(self, point: _Point) -> sp.csc_array:
-        weights = sp.diags_array(1.0 / self._scale[self._free])
-        motion = point.state[: self._n_moving]
-        stiffness = self._tangent.among(self._free, self._free, motion)
-        return sp.csc_array(weights @ stiffness @ weights)
-
-    def _solved(self, point: _Point, ahead: Floats, right: Floats, pace: float) -> Floats | None:
-        """Solves [K f; t] y = right with f the force of the held dofs' way; None if singular."""
-        way = np.zeros_like(point.state)
-        way[self._held] = self._drive.rates(self._held, np.array([point.load]))[0] / pace
-        along = np.empty_like(way)
-        locate(point.state, self.system, self._work.kinematics)
-        hessian_product(point.state, self.system, self._work.kinematics, way, along)
-        column = sp.csc_array((along[self._free] / self._scale[self._free])[:, None])
-        whole = sp.block_array(
-            [[self._stiffness(point), column], [ahead[None, :-1], ahead[None, -1:]]], format="csc"
-        )
-        try:
-            return np.asarray(spla.splu(whole).solve(right))
-        except RuntimeError:
-            return None
+    def stiffness(self, point: PathPoint) -> sp.csc_array:
+        """Assembles the scaled tangent (n_free, n_free)."""
+        found = self._tangent.among(self.free, self.free, point.state[: self._n_moving])
+        weights = 1.0 / self.scale
+        found.data *= weights[found.indices] * np.repeat(weights, np.diff(found.indptr))
+        return found

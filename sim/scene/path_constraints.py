@@ -1,5 +1,6 @@
 """Constrains designs by what they do under load: no snap on the way, no foil strained too far."""
 
+import logging
 from collections.abc import Callable, Iterator
 
 import jax
@@ -11,15 +12,27 @@ from jax import Array
 from sim.constraints import ConstraintVector
 from sim.core import Floats, SimulationError
 from sim.energy import ligament_strain, system_of
-from sim.quasistatics import StaticRecord, StaticSolver, eigenvalue_and_slopes, lowest_eigenpair
+from sim.optimise import feasible_design
+from sim.quasistatics import (
+    StaticRecord,
+    StaticSolver,
+    eigenvalue_and_slopes,
+    lowest_eigenpair,
+    softest_point,
+)
 from sim.scene.parameter_map import parameters_of_design
 from sim.scene.plan import Plan
 from sim.scene.scene import Scene
-from sim.solvers import Records, adjoint_cases, concrete, solve_cases
+from sim.solvers import PrescribedMotion, Records, adjoint_cases, concrete, solve_cases
 from sim.structure import ConcreteParameters, FoilLimit, Parameters, face_strains
+
+LOG = logging.getLogger(__name__)
 
 SHARPNESS = 64
 """p of the p-norm that stands for the largest strain: some 2 % to 10 % above it."""
+
+WATCHED = 12
+"""Evaluations for which the way to a load is looked at after a snap on it."""
 
 Slope = tuple[float, ConcreteParameters]
 """A constraint value, and its derivatives by all parameters."""
@@ -27,6 +40,8 @@ Slope = tuple[float, ConcreteParameters]
 
 SHARES = np.linspace(1.0, 0.1, 10)
 """Of a start that snaps, the larger ones first, that may serve in its place."""
+REACH, ROUNDS = 1.0, 8
+"""Largest change of a variable in a round that leads a start out of its snaps, mm; and rounds."""
 
 
 def check_unsnapped(record: StaticRecord, load: float) -> None:
@@ -45,9 +60,11 @@ class PathConstraints:
 
     Below the geometric constraints there is, in mm, with ``scene.objective.snap_margin``, one value
     for each load of each case: lambda / bound - 1 of the smallest eigenvalue lambda of the tangent,
-    the bound being that margin times the eigenvalue of the initial structure at rest; and with
-    ``scene.objective.foil`` one value for each case: 1 - strain / limit of the largest strain of
-    all ligaments and times, a p-norm in the place of the maximum.
+    the bound being that margin times the eigenvalue of the initial structure at rest. Where a
+    design snaps on its way to a load, lambda is for some evaluations that of the softest point of
+    this way, negative within a fold: so a snap is a value to be raised like any other. With
+    ``scene.objective.foil`` there is one value for each case: 1 - strain / limit of the largest
+    strain of all ligaments and times, a p-norm in the place of the maximum.
 
     A structure that cannot be made is not loaded: its values are infinite.
 
@@ -63,6 +80,7 @@ class PathConstraints:
         self._numbers = plan.simulated
         self._of_design = parameters_of_design(scene)
         self.bound: float | None = None
+        self._watched: dict[tuple[int, int], int] = {}  # evaluations left for case and load
         if share is not None:
             if not isinstance(solver, StaticSolver):
                 raise ValueError("a snap margin belongs to a static scene")
@@ -87,13 +105,16 @@ class PathConstraints:
         return np.append(geometric, values), sp.csr_array(sp.vstack([jacobian, slopes]))
 
     def drawn_back(self, start: Floats) -> Floats:
-        """Shortens a design vector until its structure does not snap."""
+        """Leads a design vector out of its snaps; where that fails, shortens it first.
+
+        Returns:
+            the design vector (n_variables,), zero if none between it and the start serves.
+        """
         for share in SHARES:
-            try:
-                self(share * start)
-            except SimulationError:
-                continue
-            return np.asarray(share * start)
+            found = feasible_design(self, share * start, REACH, ROUNDS)
+            if found is not None:
+                return found
+            LOG.info("%.0f %% of the start cannot be led out of its snaps", 100 * share)
         return np.zeros_like(start)
 
     def named(self, number: int) -> tuple[str, str]:
@@ -125,11 +146,33 @@ class PathConstraints:
     def _snaps(self, values: ConcreteParameters, records: Records) -> Iterator[Slope]:
         if self.bound is None:
             return
-        for record in records.records:
-            check_unsnapped(record, self._solver.output_times[-1])
-            for state in record.states:
-                value, bar = eigenvalue_and_slopes(record.topology, values, state)
+        self._watched = {way: left - 1 for way, left in self._watched.items() if left > 1}
+        for case, (drive, record) in enumerate(zip(self._cases, records.records, strict=True)):
+            for jump in np.flatnonzero(record.jumped):
+                self._watched[case, int(jump)] = WATCHED
+            for load in range(len(record.states)):
+                value, bar = self._smallest_eigenvalue(values, case, drive, record, load)
                 yield value / self.bound - 1.0, Parameters(*(part / self.bound for part in bar))
+
+    def _smallest_eigenvalue(
+        self, values: ConcreteParameters, case: int, drive: PrescribedMotion,
+        record: StaticRecord, load: int,
+    ) -> Slope:  # fmt: skip
+        """Finds that at a load; where a design snapped, that on the way to it if it is smaller."""
+        topology = record.topology or self._solver.topology
+        at_load = eigenvalue_and_slopes(topology, values, record.states[load])
+        if (case, load) not in self._watched:
+            return at_load
+        loads = np.append(0.0, self._solver.output_times)
+        before = record.states[load - 1] if load else np.zeros(topology.n_dofs)
+        begin, end = float(loads[load]), float(loads[load + 1])
+        found = softest_point(topology, values, drive, (begin, before), end)
+        folds = found is not None and found.eigenvalue < 0.0
+        if record.jumped[load] and not folds:  # nothing leads out of this snap
+            check_unsnapped(record, loads[-1])
+        if found is None or found.eigenvalue >= at_load[0]:
+            return at_load
+        return found.eigenvalue, found.slopes
 
     def _strains(
         self, values: ConcreteParameters, motion: Floats, records: Records

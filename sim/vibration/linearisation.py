@@ -8,7 +8,8 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
-from sim.core import Floats, Ints
+from sim.collision import raise_new_pairs
+from sim.core import Floats, Ints, NewContactPairs
 from sim.energy import Topology, kinematics_of, locate, system_of, tangent
 from sim.linalg import clear, matrix, number_free_dofs
 from sim.structure import ConcreteParameters
@@ -47,6 +48,25 @@ class Modes(NamedTuple):
         return np.asarray(np.sign(self.square) * np.sqrt(np.abs(self.square)) / (2 * np.pi))
 
 
+class _Part(NamedTuple):
+    """Holds where the entries of a part of a tangent come from, as long as no others appear."""
+
+    rows: Ints
+    columns: Ints
+    occupied: Ints  # places among the bands that are not zero
+    source: Ints  # (n_entries,) place of each among the bands
+    entry_row: Ints  # (n_entries,) row of each
+    first: Ints  # (n_columns + 1,) first entry of each column
+
+    def serves(self, rows: Ints, columns: Ints, occupied: Ints) -> bool:
+        """Tells whether the part is the same, and its pattern."""
+        return (
+            np.array_equal(self.rows, rows)
+            and np.array_equal(self.columns, columns)
+            and np.array_equal(self.occupied, occupied)
+        )
+
+
 class WholeTangent:
     """Evaluates a structure's tangent among all dofs, held ones included, state by state."""
 
@@ -57,25 +77,55 @@ class WholeTangent:
         )
         self._system = system_of(whole, values)._replace(free=self._place, pattern=pattern)
         self._matrix, self._kinematics = matrix(pattern), kinematics_of(self._system)
+        self._part: _Part | None = None
 
     def among(self, rows: Ints, columns: Ints, state: Floats) -> sp.csc_array:
-        """Assembles the part (n_rows, n_columns) of some dofs at a state (n_dofs,)."""
-        made, (n, width) = self._matrix, self._system.pattern.size
+        """Assembles the part (n_rows, n_columns) of some dofs at a state (n_dofs,).
+
+        Raises:
+            NewContactPairs: units are near whose coupling the tangent has no room for.
+        """
+        made = self._matrix
         clear(made)
         locate(state, self._system, self._kinematics)
         tangent(state, self._system, self._kinematics, made)
-        bands = made.values.reshape(n, width + 1).T
-        lower = sp.dia_array((bands, -np.arange(width + 1)), shape=(n, n))
-        full = sp.csr_array(lower + sp.tril(lower, -1).T)
-        full.eliminate_zeros()
-        return sp.csc_array(full[self._place[rows]][:, self._place[columns]])
+        raise_new_pairs(self._system.contacts)
+        occupied = np.flatnonzero(made.values)
+        if self._part is None or not self._part.serves(rows, columns, occupied):
+            self._part = self._part_of(rows, columns, occupied)
+        part = self._part
+        shape = len(rows), len(columns)
+        return sp.csc_array((made.values[part.source], part.entry_row, part.first), shape=shape)
+
+    def _part_of(self, rows: Ints, columns: Ints, occupied: Ints) -> "_Part":
+        """Finds where the entries of a part lie among the bands."""
+        n, width = self._system.pattern.size
+        column, below = np.divmod(occupied, width + 1)
+        row, off = column + below, below > 0
+        full = sp.csr_array(
+            (
+                np.append(occupied, occupied[off]) + 1,
+                (np.append(row, column[off]), np.append(column, row[off])),
+            ),
+            shape=(n, n),
+        )
+        found = sp.csc_array(full[self._place[rows]][:, self._place[columns]])
+        found.sort_indices()
+        return _Part(rows, columns, occupied, found.data - 1, found.indices, found.indptr)
 
 
 def linearised(
     topology: Topology, values: ConcreteParameters, motion: Floats | None = None
 ) -> Linear:
     """Linearises a structure about a state ``motion`` (n_units, 3); by default about rest."""
-    topology, whole = topology.unloaded, WholeTangent(topology, values)
+    try:
+        return _linearised(topology.unloaded, values, motion)
+    except NewContactPairs as met:
+        return linearised(topology.coupling(met.pairs), values, motion)
+
+
+def _linearised(topology: Topology, values: ConcreteParameters, motion: Floats | None) -> Linear:
+    whole = WholeTangent(topology, values)
     state = np.zeros(topology.n_dofs) if motion is None else np.array(motion, dtype=float).ravel()
     free = np.setdiff1d(np.arange(topology.n_dofs), topology.held)
     return Linear(
