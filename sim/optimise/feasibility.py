@@ -14,23 +14,36 @@ from sim.optimise.qp import reachable, shortest_step
 INSET = 1e-7
 """The projection aims this far inside (mm), so that rounding leaves no constraint violated."""
 
+PATIENCE = 3
+"""Rounds in which a projection gets half the way to the feasible set, unless it leads nowhere."""
+
 RETREAT_STEPS = 10
 """Number of steps in which a retreat deepens."""
 
 
 def project(
-    problem: CountedProblem, x: Floats, reach: float, rounds: int = 12, depth: float = 0.0
+    problem: CountedProblem,
+    x: Floats,
+    reach: float,
+    rounds: int = 12,
+    depth: float = 0.0,
+    patience: int = PATIENCE,
 ) -> ConstraintPoint | None:
     """Finds a design near ``x`` with every margin at least ``depth``; None if no round does.
 
     Each round is a shortest Newton step for the linearised constraints and changes no variable by
-    more than ``reach``. A design whose constraints cannot be evaluated is none.
+    more than ``reach``. The worst margin must come half the way in any ``patience`` rounds. A
+    design whose constraints cannot be evaluated is none.
     """
+    missing: list[float] = []
     try:
         place = problem.place(np.clip(x, problem.lower, problem.upper))
         for _ in range(rounds):
-            if place.values.min(initial=np.inf) >= depth:
+            missing.append(depth - float(place.values.min(initial=np.inf)))
+            if missing[-1] <= 0.0:
                 return place
+            if len(missing) > patience and missing[-1] > 0.5 * missing[-1 - patience]:
+                return None
             step = _newton(problem, place, reach, depth + INSET)
             if step is None:
                 return None
@@ -88,7 +101,7 @@ def feasible_start(problem: CountedProblem, x: Floats, reach: float) -> Constrai
         InfeasibleStartError: naming the worst constraint.
     """
     for factor in (1, 4, 16):
-        place = project(problem, x, factor * reach, rounds=50)
+        place = project(problem, x, factor * reach, rounds=50, patience=50)
         if place is not None:
             return place
     start = problem.place(x)

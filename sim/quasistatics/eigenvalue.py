@@ -13,6 +13,7 @@ import scipy.sparse.linalg as spla
 from sim.collision import raise_new_pairs
 from sim.core import Floats, NewContactPairs, SimulationError
 from sim.energy import (
+    Bars,
     System,
     Topology,
     as_values,
@@ -84,15 +85,22 @@ def _value_and_slopes(
 ) -> tuple[float, ConcreteParameters]:
     system = system_of(topology, values)
     value, mode = lowest_eigenpair(system, state)
-    bars = empty_bars(system, (1, len(system.held)))
+    bars, bar = mode_slopes(topology, system, state, mode)
+    adjoint(state[None], bar[None], system, workspace(system), topology.designed, bars)
+    raise_new_pairs(system.contacts)
+    return value, as_values(bars, topology.n_units)
+
+
+def mode_slopes(
+    topology: Topology, system: System, state: Floats, mode: Floats
+) -> tuple[Bars, Floats]:
+    """Differentiates v . K v, with the mode v (n_dofs,) held, by parameters and state (n_dofs,)."""
+    bars, bar = empty_bars(system, (1, len(system.held))), np.zeros_like(state)
     kinematics, product = kinematics_of(system), np.empty_like(state)
-    bar = np.zeros_like(state)
     for place, weight in STENCIL:  # v . dK v is the derivative of d(v . dE/du) along v
         moved, direction = state + place * STEP * mode, weight / STEP * mode
         locate(moved, system, kinematics)
         mixed(moved, system, kinematics, direction, topology.designed, bars.sensitivity)
         hessian_product(moved, system, kinematics, direction, product)
         bar += product
-    adjoint(state[None], bar[None], system, workspace(system), topology.designed, bars)
-    raise_new_pairs(system.contacts)
-    return value, as_values(bars, topology.n_units)
+    return bars, bar

@@ -236,15 +236,16 @@ def _note(snaps: Floats, place: float) -> None:
 
 @compiled
 def _advance(
-    motion: Floats, load: Floats, number: int, sense: float, pace: Floats, mode: Floats,
-    predicted: Floats, drag: Floats, relative: float, absolute: float, system: System,
+    motion: Floats, load: Floats, number: int, leaves: bool, sense: float, pace: Floats,
+    mode: Floats, predicted: Floats, drag: Floats, relative: float, absolute: float, system: System,
     work: Workspace, snaps: Floats, counts: Ints,
 ) -> tuple[float, int, float]:  # fmt: skip
     """Follows the path to one load; the workspace holds a factor of the tangent before and after.
 
     `motion` is moved; `load` (n_held,) is that of `number`; `pace` (4,), see ``INCREMENT``, and
     `mode` (n_free,), the eigenvector S v of the smallest eigenvalue, change; `predicted` (n_dofs,)
-    is scratch. For the rest see `_leave`; `snaps` gathers them, see ``Branch``.
+    is scratch. Unless it `leaves`, it stops where the path ends. For the rest see `_leave`; `snaps`
+    gathers them, see ``Branch``.
 
     Returns:
         the fraction of the way reached, with ``motion`` there; the kind of the way; and where on it
@@ -277,6 +278,9 @@ def _advance(
         if factorise_shifted(motion, system, work, counts) < 0.0:
             break
         if pace[INCREMENT] < SMALLEST_INCREMENT:
+            if not leaves:
+                _note(snaps, number + done)
+                return done, LIMIT_POINT, done
             beyond = min(1.0, CLOSE / (1.0 - done))
             share, end = _leave(
                 motion, load, beyond, mode, sense, pace[FIRST], drag, relative, absolute, system,
@@ -318,16 +322,17 @@ def _repeat(
 
 @compiled
 def follow(
-    loads: Floats, bends: Floats, trusted: Ints, sense: float, system: System, work: Workspace,
-    relative: float, absolute: float, drag: Floats, branch: Branch, counts: Ints,
+    loads: Floats, bends: Floats, trusted: Ints, leaves: bool, sense: float, system: System,
+    work: Workspace, relative: float, absolute: float, drag: Floats, branch: Branch, counts: Ints,
 ) -> tuple[int, float]:  # fmt: skip
     """Fills a branch with the equilibria at ``loads`` (n_loads, n_held).
 
     `bends` (n_loads, n_dofs) is by how much the path of a similar structure departs from its
-    tangent between two loads, to be tried first where `trusted` (n_loads,). The critical mode of a
-    branching is followed in the `sense` 1 or -1. `work` is room for the states. The residual's
-    tolerance is relative to the largest reaction, its floor `absolute` in N; `drag` (n_dofs,) is
-    that of the damped motion after a snap; `counts` (4,) gathers the work.
+    tangent between two loads, to be tried first where `trusted` (n_loads,). Where the path ends,
+    the structure `leaves` it, or the branch ends as well. The critical mode of a branching is
+    followed in the `sense` 1 or -1. `work` is room for the states. The residual's tolerance is
+    relative to the largest reaction, its floor `absolute` in N; `drag` (n_dofs,) is that of the
+    damped motion after a snap; `counts` (4,) gathers the work.
 
     Returns:
         the number of loads reached, and the fraction of the way to the next.
@@ -360,8 +365,8 @@ def follow(
                 done, pace[RATE] = 1.0, 0.0
         if done < 1.0:
             done, kind, ended = _advance(
-                motion, loads[p], p, sense, pace, mode, step, drag, relative, absolute, system,
-                work, branch.snaps, counts,
+                motion, loads[p], p, leaves, sense, pace, mode, step, drag, relative, absolute,
+                system, work, branch.snaps, counts,
             )  # fmt: skip
             branch.jumped[p], branch.snapped[p] = max(kind, branch.jumped[p]), ended
         branch.states[p] = motion

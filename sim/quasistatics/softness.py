@@ -18,17 +18,9 @@ from scipy.optimize import minimize_scalar
 
 from sim.collision import raise_new_pairs
 from sim.core import Floats, NewContactPairs
-from sim.energy import (
-    Topology,
-    as_values,
-    empty_bars,
-    hessian_product,
-    kinematics_of,
-    locate,
-    mixed,
-)
+from sim.energy import Topology, as_values, kinematics_of, locate, mixed
 from sim.quasistatics.arc_length import FEW, ArcLengthPath, PathPoint
-from sim.quasistatics.eigenvalue import STENCIL, STEP
+from sim.quasistatics.eigenvalue import mode_slopes
 from sim.solvers import PrescribedMotion
 from sim.structure import ConcreteParameters
 
@@ -134,20 +126,14 @@ def _slopes(
     system, state, free = path.system, soft.point.state, path.free
     mode = np.zeros_like(state)
     mode[free] = soft.mode / path.scale
-    bars, bar = empty_bars(system, (0, 0)), np.zeros_like(state)
-    kinematics, product = kinematics_of(system), np.empty_like(state)
-    for place, weight in STENCIL:  # v . dK v is the derivative of d(v . dE/du) along v
-        moved, direction = state + place * STEP * mode, weight / STEP * mode
-        locate(moved, system, kinematics)
-        mixed(moved, system, kinematics, direction, topology.designed, bars.sensitivity)
-        hessian_product(moved, system, kinematics, direction, product)
-        bar += product
+    bars, bar = mode_slopes(topology, system, state, mode)
     way = path.way(soft.point)
     right = np.append(bar[free] / path.scale, bar @ way)
     tangent = path.tangent_at(soft.point)
     assert tangent is not None
     direction = np.zeros_like(state)
     direction[free] = -tangent.solve_transposed(right, ahead)[:-1] / path.scale
+    kinematics = kinematics_of(system)
     locate(state, system, kinematics)
     mixed(state, system, kinematics, direction, topology.designed, bars.sensitivity)
     return as_values(bars, topology.n_units)

@@ -56,6 +56,7 @@ class StaticSolver:
     start: StaticRecord | None = None
     substeps: int = 1  # loads to pass on the way to each output load, that one included
     sense: float = 1.0  # in which the critical mode of a branching is followed: 1 or -1
+    leaves: bool = True  # a path that ends, by a snap; else states from there on are not a number
 
     def refined(self, record: StaticRecord) -> StaticSolver:
         """Passes twice the loads, each to a hundred times tighter a tolerance."""
@@ -84,14 +85,16 @@ class StaticSolver:
         check_start(top, values, system.contacts, np.zeros(top.n_dofs))
         drag = system.damping if (system.damping[top.free_dofs] > 0).all() else top.scale**2
         reached, fraction = follow(
-            loads, bends, trusted, self.sense, system, workspace(system), self.relative, floor,
-            drag, branch, counts,
+            loads, bends, trusted, self.leaves, self.sense, system, workspace(system),
+            self.relative, floor, drag, branch, counts,
         )  # fmt: skip
         raise_new_pairs(system.contacts)
         if reached < len(loads):
-            raise self._ended(values, branch.states[: reached + 1], fraction)
+            if self.leaves or not branch.jumped[reached]:
+                raise self._ended(values, branch.states[: reached + 1], fraction)
+            branch.states[reached:] = np.nan
+        check_ligaments(top, values, branch.states[:reached])
         record = self._record(branch, counts)
-        check_ligaments(top, values, record.states)
         return record.states.copy(), np.zeros_like(record.states), record
 
     def _ended(

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -40,7 +41,7 @@ Slope = tuple[float, ConcreteParameters]
 
 SHARES = np.linspace(1.0, 0.1, 10)
 """Of a start that snaps, the larger ones first, that may serve in its place."""
-REACH, ROUNDS = 1.0, 8
+REACH, ROUNDS = 1.0, 20
 """Largest change of a variable in a round that leads a start out of its snaps, mm; and rounds."""
 
 
@@ -76,6 +77,10 @@ class PathConstraints:
     def __init__(self, scene: Scene, plan: Plan, geometry: ConstraintVector) -> None:
         share, solver = scene.objective.snap_margin, plan.solver
         self.geometry, self._solver, self._foil = geometry, solver, scene.objective.foil
+        # strains are those of the whole path, eigenvalues need none beyond a snap
+        self._path = solver
+        if isinstance(solver, StaticSolver) and self._foil is None:
+            self._path = replace(solver, leaves=False)
         self._cases = [scene.loads.cases[case] for case in plan.simulated]
         self._numbers = plan.simulated
         self._of_design = parameters_of_design(scene)
@@ -138,7 +143,7 @@ class PathConstraints:
     def _under_load(self, design: Floats) -> tuple[Floats, Floats]:
         """Values (n,) of all loads in mm, and their derivatives (n, n_variables)."""
         values = concrete(self._of_design(design))
-        motion, _, records = solve_cases(self._solver, values, self._cases)
+        motion, _, records = solve_cases(self._path, values, self._cases)
         every = [*self._snaps(values, records), *self._strains(values, motion, records)]
         rows = [self._of_design.pull_back(design, Parameters(*bar)) for _, bar in every]
         return np.array([value for value, _ in every]), np.stack(rows)
@@ -151,20 +156,23 @@ class PathConstraints:
             for jump in np.flatnonzero(record.jumped):
                 self._watched[case, int(jump)] = WATCHED
             for load in range(len(record.states)):
-                value, bar = self._smallest_eigenvalue(values, case, drive, record, load)
+                watched = (case, load) in self._watched
+                value, bar = self._smallest_eigenvalue(values, drive, record, load, watched)
                 yield value / self.bound - 1.0, Parameters(*(part / self.bound for part in bar))
 
     def _smallest_eigenvalue(
-        self, values: ConcreteParameters, case: int, drive: PrescribedMotion,
-        record: StaticRecord, load: int,
+        self, values: ConcreteParameters, drive: PrescribedMotion, record: StaticRecord, load: int,
+        watched: bool,
     ) -> Slope:  # fmt: skip
-        """Finds that at a load; where a design snapped, that on the way to it if it is smaller."""
-        topology = record.topology or self._solver.topology
-        at_load = eigenvalue_and_slopes(topology, values, record.states[load])
-        if (case, load) not in self._watched:
+        """Finds that at a load, or on the watched way to it; infinite beyond the end of a path."""
+        topology, state = record.topology or self._solver.topology, record.states[load]
+        before = record.states[load - 1] if load else np.zeros_like(state)
+        at_load = np.inf, ConcreteParameters(*(np.zeros_like(part) for part in values))
+        if np.isfinite(state).all():
+            at_load = eigenvalue_and_slopes(topology, values, state)
+        if not watched or not np.isfinite(before).all():
             return at_load
         loads = np.append(0.0, self._solver.output_times)
-        before = record.states[load - 1] if load else np.zeros(topology.n_dofs)
         begin, end = float(loads[load]), float(loads[load + 1])
         found = softest_point(topology, values, drive, (begin, before), end)
         folds = found is not None and found.eigenvalue < 0.0

@@ -111,6 +111,20 @@ def test_the_end_of_a_path_with_snaps_does_not_depend_on_its_loads(seed: int, sn
         )
 
 
+def test_a_path_that_is_not_left_ends_where_the_structure_snaps() -> None:
+    rig, values = crumpled(31)
+    loads = np.linspace(0.1, 1.0, 10)
+    gone, stayed = (
+        StaticSolver(rig.topology, loads, leaves=leaves).forward(values, rig.drive)[2]
+        for leaves in (True, False)
+    )
+    first = int(np.flatnonzero(gone.jumped)[0])
+    assert np.flatnonzero(stayed.jumped).tolist() == [first]
+    assert stayed.snaps.tolist() == [gone.snaps[0]]
+    np.testing.assert_array_equal(stayed.states[:first], gone.states[:first])
+    assert np.isnan(stayed.states[first:]).all()
+
+
 def test_a_snap_ends_where_damped_motion_comes_to_rest() -> None:
     """The motion C dq/dt = -dE/dq is followed by an implicit method of SciPy."""
     rig, values = crumpled(19)

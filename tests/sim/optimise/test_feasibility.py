@@ -1,0 +1,25 @@
+import numpy as np
+
+from sim.core import Floats
+from sim.optimise import feasible_design
+
+
+def test_a_projection_that_leads_nowhere_is_given_up() -> None:
+    """A margin that no step raises, whatever its slope promises."""
+    asked: list[float] = []
+
+    def constrain(x: Floats) -> tuple[Floats, Floats]:
+        asked.append(float(x[0]))
+        return np.array([-1.0]), np.ones((1, len(x)))
+
+    assert feasible_design(constrain, np.zeros(2), 1.0, 50) is None
+    assert len(asked) == 4
+
+
+def test_a_design_outside_is_moved_to_the_nearest_one_inside() -> None:
+    def outside_of_a_circle(x: Floats) -> tuple[Floats, Floats]:
+        return np.array([x @ x - 4.0]), 2.0 * x[None]
+
+    found = feasible_design(outside_of_a_circle, np.array([1.14, 1.52]), 1.0, 20)
+    assert found is not None
+    np.testing.assert_allclose(found, [1.2, 1.6], atol=5e-3)
