@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from sim.collision import raise_new_pairs
-from sim.core import Floats, NewContactPairs
+from sim.core import Floats, NewContactPairs, SimulationError
 from sim.energy import Topology, as_values, kinematics_of, locate, mixed
 from sim.quasistatics.arc_length import FEW, ArcLengthPath, PathPoint
 from sim.quasistatics.eigenvalue import mode_slopes
@@ -59,6 +59,9 @@ def softest_point(
 
     Returns:
         the point; None if the path is softest at one of its ends.
+
+    Raises:
+        SimulationError: the tangent is exactly singular there.
     """
     try:
         return _softest(topology, values, drive, start, end)
@@ -84,7 +87,6 @@ def _softest(
     before, after = found[softest - 1].point, found[softest + 1].point
     ahead = path.chord(before, found[softest].point)
     span = float(ahead @ path.step(before, after))
-
     near = path.tangent_at(before)
 
     def at(length: float) -> _Soft:
@@ -96,12 +98,12 @@ def _softest(
         options={"xatol": 0.1 * BRACKET * span},
     )  # fmt: skip
     left, middle, right = (at(best.x + side * BRACKET * span) for side in (-1.0, 0.0, 1.0))
-    raise_new_pairs(path.system.contacts)
     if middle.point.load >= end:
         return None
     falls, rises = (max(one.eigenvalue - middle.eigenvalue, 1e-300) for one in (left, right))
     share = rises / (falls + rises)
     one, two = (_slopes(path, topology, each, ahead) for each in (left, right))
+    raise_new_pairs(path.system.contacts)
     slopes = ConcreteParameters(
         *(share * a + (1.0 - share) * b for a, b in zip(one, two, strict=True))
     )
@@ -130,7 +132,8 @@ def _slopes(
     way = path.way(soft.point)
     right = np.append(bar[free] / path.scale, bar @ way)
     tangent = path.tangent_at(soft.point)
-    assert tangent is not None
+    if tangent is None:
+        raise SimulationError("the tangent is singular at the softest point of a path")
     direction = np.zeros_like(state)
     direction[free] = -tangent.solve_transposed(right, ahead)[:-1] / path.scale
     kinematics = kinematics_of(system)
