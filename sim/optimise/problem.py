@@ -222,6 +222,7 @@ class CountedProblem:
         if self.confirm is None:
             return self.best
         found: EvaluatedPoint | None = None
+        last: SimulationError | None = None
         succeeded = (each for each in self.evaluations if each.failure is None)
         for each in sorted(succeeded, key=lambda each: (each.violation, each.loss)):
             if found is not None and (found.violation, found.loss) <= (each.violation, each.loss):
@@ -231,6 +232,7 @@ class CountedProblem:
                 place = self.place(each.x)  # constraints may have learnt since
             except SimulationError as failure:
                 log.warning("evaluation %d is not confirmed: %s", each.number, failure)
+                last = failure
                 continue
             if abs(loss - each.loss) > CONFIRMED * abs(each.loss):
                 log.warning("evaluation %d is not confirmed: its loss is %.5g", each.number, loss)
@@ -239,5 +241,8 @@ class CountedProblem:
                     place.x, place.values, place.jacobian, each.number, loss, gradient, aux
                 )
         if found is None:
-            raise SimulationError("no design can be simulated by the path as it is reported")
+            raise SimulationError(
+                f"no design can be simulated by the path as it is reported ({last}); try more load"
+                " steps, which see what this path sees"
+            )
         return found
