@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse.linalg as spla
 
+from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints
 from sim.energy import Topology, hessian_product, kinematics_of, locate, system_of, tangent
 from sim.linalg import clear, factorise, matrix, solve
@@ -20,6 +21,9 @@ def highest_frequency(
     """Highest angular eigenfrequency (rad/s) about a state (default rest), by Lanczos iteration.
 
     Contact on void angles is that of the ligaments ``touching`` (default all).
+
+    Raises:
+        NewContactPairs: units are near whose coupling the topology has no room for.
     """
     system = system_of(topology, values, touching)
     state = np.zeros(topology.n_dofs) if motion is None else motion.ravel()
@@ -33,7 +37,9 @@ def highest_frequency(
         hessian_product(state, system, kinematics, full, out)
         return np.asarray(out[free] / root)
 
-    return float(np.sqrt(abs(_largest(product, topology.n_free, 1e-2))))
+    square = _largest(product, topology.n_free, 1e-2)
+    raise_new_pairs(system.contacts)
+    return float(np.sqrt(abs(square)))
 
 
 def lowest_frequency(topology: Topology, values: ConcreteParameters) -> float:

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from sim.collision import CandidatePairs
-from sim.core import Floats, SimulationError
+from sim.core import Floats, NewContactPairs, SimulationError
 from sim.energy import observe
 from sim.quasistatics import StaticSolver, eigenvalue_and_slopes
 from sim.solvers import LinearRamp, Records, Solver, adjoint_cases, solve_case, solve_cases
 from sim.structure import clearance, close_pairs, displaced
 from sim.time_integration import ExplicitSolver, ImplicitSolver
+from sim.vibration import highest_frequency, linearised
 from tests.sim.solvers.test_gradients import Ray, assert_exact_in_contact
 from tests.sim.structures import Rig, hand_made, rotating_squares, shaken, squeezed
 
@@ -145,6 +146,20 @@ def test_an_eigenvalue_counts_contact_of_pairs_that_were_far_apart() -> None:
     )
     assert bare[0] == pytest.approx(roomy[0], rel=1e-9)
     assert roomy[0] == pytest.approx(record.eigenvalue[-1], rel=1e-4)
+
+
+def test_vibrations_count_contact_of_pairs_that_were_far_apart() -> None:
+    rig = far_apart(32.5)
+    record = solve_case(StaticSolver(rig.topology, np.ones(1)), rig.values, rig.drive)[2]
+    state = record.states[-1].reshape(-1, 3)
+    roomy, bare = (
+        linearised(topology, rig.values, state).stiffness.toarray()
+        for topology in (record.topology, rig.topology)
+    )
+    np.testing.assert_allclose(bare, roomy, rtol=1e-12)
+    assert highest_frequency(record.topology, rig.values, state) > 0.0
+    with pytest.raises(NewContactPairs, match="1 and 2 meet"):
+        highest_frequency(rig.topology, rig.values, state)
 
 
 @pytest.mark.parametrize("solver", DYNAMIC)
