@@ -139,7 +139,7 @@ class Tangent:
     """
 
     def __init__(self, stiffness: sp.csc_array, load: Floats) -> None:
-        self.stiffness, self.size, self._load = stiffness, len(load), load
+        self._stiffness, self.size, self._load = stiffness, len(load), load
         # without pivoting the signs of the pivots are those of the eigenvalues
         self._factor = spla.splu(
             stiffness, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
@@ -162,6 +162,9 @@ class Tangent:
 
     def lowest(self, count: int) -> tuple[Floats, Floats]:
         """Finds the smallest eigenvalue, or so many negative ones, from zero down; and modes."""
+        if self.size < FEW:
+            values, modes = np.linalg.eigh(self._stiffness.toarray())
+            return values[:count], modes[:, :count]
         inverse = spla.LinearOperator(
             (self.size, self.size), matvec=self._factor.solve, dtype=float
         )
@@ -225,7 +228,7 @@ class ArcLengthPath:
         return PathPoint(load, placed)
 
     def correct(
-        self, begin: PathPoint, ahead: Floats, length: float, near: "Tangent | None" = None
+        self, begin: PathPoint, ahead: Floats, length: float, near: Tangent | None = None
     ) -> tuple[PathPoint | None, bool]:
         """Finds the equilibrium an arc length ahead; tells whether it was found fast.
 
@@ -295,11 +298,9 @@ class ArcLengthPath:
         tangent = self.tangent_at(point)
         if tangent is None:
             return 0.0, 0
-        if tangent.size < FEW:
-            return float(np.linalg.eigvalsh(tangent.stiffness.toarray())[0]), tangent.falling
         return float(tangent.lowest(1)[0][0]), tangent.falling
 
-    def tangent_at(self, point: PathPoint) -> "Tangent | None":
+    def tangent_at(self, point: PathPoint) -> Tangent | None:
         """Factorises the tangent at a point; None if it is singular."""
         if self._last is None or self._last[0] is not point:
             way, along = self.way(point), np.empty_like(point.state)

@@ -244,8 +244,8 @@ def _advance(
 
     `motion` is moved; `load` (n_held,) is that of `number`; `pace` (4,), see ``INCREMENT``, and
     `mode` (n_free,), the eigenvector S v of the smallest eigenvalue, change; `predicted` (n_dofs,)
-    is scratch. Unless it `leaves`, it stops where the path ends. For the rest see `_leave`; `snaps`
-    gathers them, see ``Branch``.
+    is scratch; `snaps` gathers them. Unless it `leaves`, it stops where the path ends. For the rest
+    see `_leave`.
 
     Returns:
         the fraction of the way reached, with ``motion`` there; the kind of the way; and where on it

@@ -19,7 +19,7 @@ from scipy.optimize import minimize_scalar
 from sim.collision import raise_new_pairs
 from sim.core import Floats, NewContactPairs, SimulationError
 from sim.energy import Topology, as_values, kinematics_of, locate, mixed
-from sim.quasistatics.arc_length import FEW, ArcLengthPath, PathPoint
+from sim.quasistatics.arc_length import ArcLengthPath, PathPoint
 from sim.quasistatics.eigenvalue import mode_slopes
 from sim.solvers import PrescribedMotion
 from sim.structure import ConcreteParameters
@@ -113,7 +113,7 @@ def _softest(
 def _soft(path: ArcLengthPath, point: PathPoint) -> _Soft:
     """Finds the smallest eigenvalue at a point, and its mode."""
     tangent = path.tangent_at(point)
-    if tangent is None or tangent.size < FEW:
+    if tangent is None:
         values, modes = np.linalg.eigh(path.stiffness(point).toarray())
     else:
         values, modes = tangent.lowest(max(tangent.falling, 1))

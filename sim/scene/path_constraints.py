@@ -115,11 +115,11 @@ class PathConstraints:
         Returns:
             the design vector (n_variables,), zero if none between it and the start serves.
         """
-        for share in SHARES:
+        for share in SHARES if start.any() else ():
             found = feasible_design(self, share * start, REACH, ROUNDS)
             if found is not None:
                 return found
-            LOG.info("%.0f %% of the start cannot be led out of its snaps", 100 * share)
+            LOG.info("no design near %.0f %% of the start keeps to the constraints", 100 * share)
         return np.zeros_like(start)
 
     def named(self, number: int) -> tuple[str, str]:

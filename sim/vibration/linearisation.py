@@ -97,7 +97,7 @@ class WholeTangent:
         shape = len(rows), len(columns)
         return sp.csc_array((made.values[part.source], part.entry_row, part.first), shape=shape)
 
-    def _part_of(self, rows: Ints, columns: Ints, occupied: Ints) -> "_Part":
+    def _part_of(self, rows: Ints, columns: Ints, occupied: Ints) -> _Part:
         """Finds where the entries of a part lie among the bands."""
         n, width = self._system.pattern.size
         column, below = np.divmod(occupied, width + 1)
