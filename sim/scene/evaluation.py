@@ -30,9 +30,6 @@ from sim.structure import Parameters
 
 LOG = logging.getLogger(__name__)
 
-CONFIRMING = 4
-"""Loads passed for each of the loss when a design's loss is confirmed."""
-
 
 class Memory(Protocol):
     """Remembers the equilibrium paths of designs, to start similar ones from."""
@@ -315,11 +312,8 @@ def _from_rest(scene: Scene, plan: Plan) -> Evaluator | None:
     if not isinstance(plan.solver, StaticSolver):
         return None
     memory = None if scene.objective.snap_margin is None else _Unsnapped(scene.loads.duration)
-    if plan.passed is None:
-        finer = replace(plan.solver, substeps=CONFIRMING)
-        return Evaluator(scene, replace(plan, solver=finer), memory)
-    solver = replace(plan.solver, output_times=plan.passed)
-    at = np.searchsorted(plan.passed, sample_times(scene) * (1 - 1e-9))
+    solver = plan.confirming
+    at = np.searchsorted(solver.output_times, sample_times(scene) * (1 - 1e-9))
     return Evaluator(scene, replace(plan, solver=solver), memory, at=at)
 
 

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from jax import Array
 
 from sim.constraints import ConstraintVector
-from sim.core import Floats, SimulationError
+from sim.core import Floats, Ints, SimulationError
 from sim.energy import ligament_strain, system_of
 from sim.optimise import feasible_design
 from sim.quasistatics import (
@@ -60,10 +60,11 @@ class PathConstraints:
     """Evaluates what a design must keep to, at rest and under its loads.
 
     Below the geometric constraints there is, in mm, with ``scene.objective.snap_margin``, one value
-    for each load of each case: lambda / bound - 1 of the smallest eigenvalue lambda of the tangent,
-    the bound being that margin times the eigenvalue of the initial structure at rest. Where a
-    design snaps on its way to a load, lambda is for some evaluations that of the softest point of
-    this way, negative within a fold: so a snap is a value to be raised like any other. With
+    for each load of the loss and each case: lambda / bound - 1 of the smallest eigenvalue lambda of
+    the tangent at this load and at those passed on the way there (``Plan.confirming``), the bound
+    being that margin times the eigenvalue of the initial structure at rest. Where a design snaps
+    between two of them, lambda is for some evaluations that of the softest point there, negative
+    within a fold: so a snap is a value to be raised like any other. With
     ``scene.objective.foil`` there is one value for each case: 1 - strain / limit of the largest
     strain of all ligaments and times, a p-norm in the place of the maximum.
 
@@ -77,10 +78,12 @@ class PathConstraints:
     def __init__(self, scene: Scene, plan: Plan, geometry: ConstraintVector) -> None:
         share, solver = scene.objective.snap_margin, plan.solver
         self.geometry, self._solver, self._foil = geometry, solver, scene.objective.foil
-        # strains are those of the whole path, eigenvalues need none beyond a snap
         self._path = solver
-        if isinstance(solver, StaticSolver) and self._foil is None:
-            self._path = replace(solver, leaves=False)
+        if isinstance(solver, StaticSolver):
+            # strains are those of the whole path, eigenvalues need none beyond a snap
+            self._path = replace(plan.confirming, leaves=self._foil is not None)
+            ends = solver.output_times
+            self._load_of = np.searchsorted(ends, self._path.output_times * (1.0 - 1e-9))
         self._cases = [scene.loads.cases[case] for case in plan.simulated]
         self._numbers = plan.simulated
         self._of_design = parameters_of_design(scene)
@@ -155,32 +158,45 @@ class PathConstraints:
         for case, (drive, record) in enumerate(zip(self._cases, records.records, strict=True)):
             for jump in np.flatnonzero(record.jumped):
                 self._watched[case, int(jump)] = WATCHED
-            for load in range(len(record.states)):
-                watched = (case, load) in self._watched
-                value, bar = self._smallest_eigenvalue(values, drive, record, load, watched)
+            for load in range(len(self._solver.output_times)):
+                passed = np.flatnonzero(self._load_of == load)
+                found = [
+                    self._smallest_between(values, drive, record, way)
+                    for way in map(int, passed)
+                    if (case, way) in self._watched
+                ]
+                at_loads = self._smallest_at(values, record, passed)
+                value, bar = min([at_loads, *found], key=lambda slope: slope[0])
                 yield value / self.bound - 1.0, Parameters(*(part / self.bound for part in bar))
 
-    def _smallest_eigenvalue(
-        self, values: ConcreteParameters, drive: PrescribedMotion, record: StaticRecord, load: int,
-        watched: bool,
-    ) -> Slope:  # fmt: skip
-        """Finds that at a load, or on the watched way to it; infinite beyond the end of a path."""
-        topology, state = record.topology or self._solver.topology, record.states[load]
-        before = record.states[load - 1] if load else np.zeros_like(state)
-        at_load = np.inf, ConcreteParameters(*(np.zeros_like(part) for part in values))
-        if np.isfinite(state).all():
-            at_load = eigenvalue_and_slopes(topology, values, state)
-        if not watched or not np.isfinite(before).all():
-            return at_load
-        loads = np.append(0.0, self._solver.output_times)
-        begin, end = float(loads[load]), float(loads[load + 1])
+    def _smallest_at(self, values: ConcreteParameters, record: StaticRecord, passed: Ints) -> Slope:
+        """Finds the smallest eigenvalue at some loads; infinite if the path ends before them."""
+        reached = passed[np.isfinite(record.states[passed]).all(axis=1)]
+        if not len(reached):
+            return np.inf, ConcreteParameters(*(np.zeros_like(part) for part in values))
+        softest = reached[record.eigenvalue[reached].argmin()]
+        topology = record.topology or self._solver.topology
+        return eigenvalue_and_slopes(topology, values, record.states[softest])
+
+    def _smallest_between(
+        self, values: ConcreteParameters, drive: PrescribedMotion, record: StaticRecord, way: int
+    ) -> Slope:
+        """Finds that of the softest point between a load and the one before; infinite if none."""
+        nothing = np.inf, ConcreteParameters(*(np.zeros_like(part) for part in values))
+        before = record.states[way - 1] if way else np.zeros_like(record.states[way])
+        if not np.isfinite(before).all():
+            return nothing
+        loads = np.append(0.0, self._path.output_times)
+        begin, end = float(loads[way]), float(loads[way + 1])
+        topology = record.topology or self._solver.topology
         found = softest_point(topology, values, drive, (begin, before), end)
         folds = found is not None and found.eigenvalue < 0.0
-        if record.jumped[load] and not folds:  # nothing leads out of this snap
+        if found is not None and folds:
+            share, value = found.load / loads[-1], found.eigenvalue
+            LOG.info("a snap at %.3g of the load: smallest eigenvalue %.2g N/mm", share, value)
+        if record.jumped[way] and not folds:  # nothing leads out of this snap
             check_unsnapped(record, loads[-1])
-        if found is None or found.eigenvalue >= at_load[0]:
-            return at_load
-        return found.eigenvalue, found.slopes
+        return nothing if found is None else (found.eigenvalue, found.slopes)
 
     def _strains(
         self, values: ConcreteParameters, motion: Floats, records: Records
@@ -191,7 +207,7 @@ class PathConstraints:
             ratio, (bar_motion, direct) = self._strain(one, values)
             bar = np.asarray(bar_motion)[None]
             alone = Records(values, [drive], [record])
-            through = adjoint_cases(self._solver, alone, bar, np.zeros_like(bar)).parameters
+            through = adjoint_cases(self._path, alone, bar, np.zeros_like(bar)).parameters
             parts = (-one - other for one, other in zip(direct, through, strict=True))
             yield 1.0 - float(ratio), ConcreteParameters(*map(np.asarray, parts))
 

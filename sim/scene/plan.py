@@ -1,6 +1,6 @@
 """Decides what a scene needs and what it may skip: once, printed, and stored with results."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +16,9 @@ from sim.solvers import Solver, check_free_dofs
 from sim.structure import ConcreteParameters
 from sim.time_integration import ImplicitSolver
 
+CONFIRMING = 4
+"""Loads passed for each of the loss where its loads alone are known."""
+
 
 @dataclass(frozen=True, eq=False)
 class Plan:
@@ -27,14 +30,24 @@ class Plan:
     decisions: tuple[str, ...]  # one line for each thing decided
     skipped: tuple[str, ...]  # one line for each thing left out
     warnings: tuple[str, ...] = ()  # what may not be meant, a line each; logged
-    # (n_loads,) load parameters, those of the loss among them, by which the paths of a static scene
-    # are followed anew to confirm losses; None for four for each of these
+    # (n_loads,) load parameters, those of the loss among them, that paths of a static scene pass
+    # where losses are confirmed and snaps avoided; None for four for each of these
     passed: Floats | None = None
 
     @property
     def simulated(self) -> Ints:
         """Lists the cases that are simulated, ascending."""
         return np.unique(self.case_of)
+
+    @property
+    def confirming(self) -> StaticSolver:
+        """Follows the paths of a static scene through all loads that confirm a loss."""
+        assert isinstance(self.solver, StaticSolver)
+        if self.passed is not None:
+            return replace(self.solver, output_times=self.passed)
+        ends = self.solver.output_times
+        way, left = np.diff(ends, prepend=0.0), np.arange(CONFIRMING - 1, -1, -1) / CONFIRMING
+        return replace(self.solver, output_times=(ends[:, None] - way[:, None] * left).ravel())
 
     def describe(self) -> str:
         """Says the plan in words, a line a decision."""
