@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from pipeline.runtime import UserError
 
 if TYPE_CHECKING:
+    from pipeline.problem import Problem
     from sim.constraints import ConstraintVector
     from sim.core import SimulationError
-    from sim.optimise import InfeasibleStartError
+    from sim.optimise import InfeasibleStartError, UnconfirmedError
     from sim.scene import PathConstraints, Scene
 
 _KEYS = {
@@ -43,6 +44,14 @@ def infeasible_start(
         key=_KEYS.get(kind, f"constraints.{kind}"),
         remedy="ask for less there, or start from another lattice",
     )
+
+
+def unconfirmed(error: UnconfirmedError, asked: Problem, source: Path) -> UserError:
+    """Explains that the path as it is reported confirms none of the designs tried."""
+    remedy = "raise it, so that the optimiser sees what the reported path sees"
+    if asked.objective.snap == "avoid":
+        remedy += "; or begin elsewhere (optimiser.start), or lower drive.amplitude"
+    return UserError(str(error), file=source, key="horizon.steps", remedy=remedy)
 
 
 class SimulatedStructure(NamedTuple):

@@ -39,6 +39,7 @@ from sim.optimise import (
     MmaOptions,
     Result,
     SqpOptions,
+    UnconfirmedError,
 )
 from sim.scene import Paths, Plan, Scene, constraints_of, make_plan, minimise
 from sim.structure import overlapping_pairs, shape, smallest_gap
@@ -181,6 +182,8 @@ def optimise(
         except InfeasibleStartError as error:
             constraints = constraints_of(scene, plan, limits_of(asked))
             raise failures.infeasible_start(error, constraints, source) from error
+        except UnconfirmedError as error:
+            raise failures.unconfirmed(error, asked, source) from error
         except SimulationError as error:
             tried = failures.SimulatedStructure(source, scene, "initial", plan.solver.output_times)
             raise failures.simulation_failure(error, tried, None) from error

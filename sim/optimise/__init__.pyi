@@ -8,4 +8,5 @@ from .problem import Evaluate as Evaluate
 from .problem import Evaluation as Evaluation
 from .problem import InfeasibleStartError as InfeasibleStartError
 from .problem import Result as Result
+from .problem import UnconfirmedError as UnconfirmedError
 from .sqp import SqpOptions as SqpOptions

@@ -41,7 +41,8 @@ def minimise(
 
     Raises:
         InfeasibleStartError: no feasible design near the start.
-        SimulationError: the start cannot be simulated, or no design is confirmed.
+        SimulationError: the start cannot be simulated.
+        UnconfirmedError: no design is confirmed.
         ValueError: options of another method.
     """
     start = np.array(x0, dtype=float)

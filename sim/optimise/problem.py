@@ -27,6 +27,10 @@ CONFIRMED = 1e-6
 log = logging.getLogger(__name__)
 
 
+class UnconfirmedError(SimulationError):
+    """None of the designs evaluated is confirmed."""
+
+
 class InfeasibleStartError(ValueError):
     """No design that meets all constraints was found near the start.
 
@@ -241,8 +245,5 @@ class CountedProblem:
                     place.x, place.values, place.jacobian, each.number, loss, gradient, aux
                 )
         if found is None:
-            raise SimulationError(
-                f"no design can be simulated by the path as it is reported ({last}); try more load"
-                " steps, which see what this path sees"
-            )
+            raise UnconfirmedError(f"no design is confirmed by its path as it is reported: {last}")
         return found

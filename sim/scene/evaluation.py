@@ -240,6 +240,7 @@ def minimise(
     Raises:
         InfeasibleStartError: no feasible design near the start.
         SimulationError: the start cannot be simulated.
+        UnconfirmedError: no design is confirmed by a path through more loads.
     """
     made = plan or make_plan(scene)
     computed, constraints = Evaluator(scene, made, paths), constraints_of(scene, made, limits)

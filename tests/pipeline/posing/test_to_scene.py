@@ -7,7 +7,7 @@ from pipeline.posing import failures, limits_of, scene_of
 from pipeline.posing.to_scene import contact_laws
 from pipeline.problem.reading import load
 from sim.constraints import ConstraintVector
-from sim.optimise import InfeasibleStartError
+from sim.optimise import InfeasibleStartError, UnconfirmedError
 from sim.structure import VoidAngleContact
 from tests.pipeline.conftest import Failing
 from tests.pipeline.static import HOLE, SHIELD, write
@@ -64,6 +64,20 @@ def test_a_measured_drive_that_cannot_be_meant(
     series = "".join(f"{row},0,0\n" for row in rows.splitlines())
     (tmp_path / "push.csv").write_text(f"time (s),ux (mm),uy (mm),theta (rad)\n{series}")
     assert what in design(path, failing)
+
+
+@pytest.mark.parametrize(("snap", "elsewhere"), [("allow", False), ("avoid", True)])
+def test_an_unconfirmed_run_is_told_what_to_change(
+    snap: str, elsewhere: bool, tmp_path: Path
+) -> None:
+    path = write(tmp_path, HOLE, size=5)
+    problem = load(path)
+    asked = problem.model_copy(
+        update={"objective": problem.objective.model_copy(update={"snap": snap})}
+    )
+    told = failures.unconfirmed(UnconfirmedError("it snaps"), asked, path)
+    assert (told.key, told.what) == ("horizon.steps", "it snaps")
+    assert ("optimiser.start" in str(told.remedy)) == elsewhere
 
 
 def test_an_infeasible_start_names_unit_and_vertex(tmp_path: Path) -> None:

@@ -8,7 +8,14 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array
 
 import sim
-from sim.optimise import Evaluation, InfeasibleStartError, Result, minimise, stationarity
+from sim.optimise import (
+    Evaluation,
+    InfeasibleStartError,
+    Result,
+    UnconfirmedError,
+    minimise,
+    stationarity,
+)
 from sim.optimise.minimisation import Method
 from sim.optimise.quasi_newton import DAMPING, QuasiNewton
 from tests.sim.optimise import known_problems as problems
@@ -222,6 +229,16 @@ def test_the_best_design_is_that_whose_confirmed_loss_is_the_best(method: Method
     confirmed = reachable + np.where(reachable < -1.2, 0.5, 0.0)
     assert found.loss == confirmed.min() == confirm(found.x)[0]
     assert (found.evaluations[found.best].x == found.x).all()
+
+
+def test_a_run_of_which_nothing_is_confirmed_says_why() -> None:
+    known = problems.corner()
+
+    def confirm(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        raise sim.SimulationError(f"snaps with {x.size} variables")
+
+    with pytest.raises(UnconfirmedError, match="snaps with"):
+        minimise("sqp", known.loss, known.constraints, known.start, confirm=confirm)
 
 
 def test_runs_are_reproducible_bit_for_bit() -> None:
