@@ -119,10 +119,11 @@ class PathConstraints:
             the design vector (n_variables,), zero if none between it and the start serves.
         """
         for share in SHARES if start.any() else ():
+            LOG.info("leading %.0f %% of the start out of its snaps, if any", 100 * share)
             found = feasible_design(self, share * start, REACH, ROUNDS)
             if found is not None:
                 return found
-            LOG.info("no design near %.0f %% of the start keeps to the constraints", 100 * share)
+            LOG.info("no design near it keeps to the constraints")
         return np.zeros_like(start)
 
     def named(self, number: int) -> tuple[str, str]:
@@ -193,7 +194,7 @@ class PathConstraints:
         folds = found is not None and found.eigenvalue < 0.0
         if found is not None and folds:
             share, value = found.load / loads[-1], found.eigenvalue
-            LOG.info("a snap at %.3g of the load: smallest eigenvalue %.2g N/mm", share, value)
+            LOG.debug("a snap at %.3g of the load: smallest eigenvalue %.2g N/mm", share, value)
         if record.jumped[way] and not folds:  # nothing leads out of this snap
             check_unsnapped(record, loads[-1])
         return nothing if found is None else (found.eigenvalue, found.slopes)

@@ -20,7 +20,8 @@ film track compare
 
 SERVER = """
 import os, sys
-import pint, pydantic, snakemake.cli, yaml
+import PIL.Image, docutils.core, jinja2, pint, pydantic, requests, smart_open, yaml, yte
+import snakemake.cli, snakemake.report
 for line in sys.stdin:
     root, told, *words = line.rstrip("\\n").split("\\t")
     if not (child := os.fork()):
@@ -89,15 +90,23 @@ class Sandbox:
         return Counter({rule: int(count) for rule, count in map(str.split, table)})
 
 
+@pytest.fixture(scope="session")
+def planned_once(tmp_path_factory: pytest.TempPathFactory) -> Sandbox:
+    sandbox = _copied(tmp_path_factory.mktemp("planned") / "repository")
+    assert sandbox.planned("fig2")  # hashes all sources
+    return sandbox
+
+
 @pytest.fixture
-def sandbox(tmp_path: Path) -> Sandbox:
+def sandbox(planned_once: Sandbox, tmp_path: Path) -> Sandbox:
     """A repository in which nothing has run."""
-    return _copied(tmp_path / "repository")
+    return Sandbox(shutil.copytree(planned_once.root, tmp_path / "repository"))
 
 
 @pytest.fixture(scope="session")
-def built_once(tmp_path_factory: pytest.TempPathFactory) -> Sandbox:
-    sandbox = _copied(tmp_path_factory.mktemp("built") / "repository")
+def built_once(planned_once: Sandbox, tmp_path_factory: pytest.TempPathFactory) -> Sandbox:
+    folder = tmp_path_factory.mktemp("built") / "repository"
+    sandbox = Sandbox(shutil.copytree(planned_once.root, folder))
     ended = sandbox.run("fig2")
     assert ended.returncode == 0, ended.stderr
     return sandbox

@@ -41,12 +41,8 @@ class Document:
         return None
 
 
-class _Loader(yaml.SafeLoader):
-    """Loads plain data only, see `_refuse`, and every key once."""
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        _refuse(self.peek_event())  # type: ignore[no-untyped-call]
-        return super().compose_node(parent, index)
+class _Loader(yaml.CSafeLoader):
+    """Loads plain data only, and every key once, of what passed `_check_events`."""
 
     def construct_scalar(self, node: yaml.ScalarNode | yaml.MappingNode) -> str:
         if isinstance(node, yaml.ScalarNode) and _CONTROL.search(node.value):
@@ -75,7 +71,7 @@ class _Loader(yaml.SafeLoader):
 
 _Loader.yaml_implicit_resolvers = {
     first: [pair for pair in pairs if pair[0] != "tag:yaml.org,2002:bool"]
-    for first, pairs in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    for first, pairs in yaml.CSafeLoader.yaml_implicit_resolvers.items()
 }
 _Loader.add_implicit_resolver(  # of YAML 1.2: yes, no, on and off are texts
     "tag:yaml.org,2002:bool", re.compile("true|True|TRUE|false|False|FALSE"), list("tTfF")
@@ -109,6 +105,7 @@ def read_yaml(path: Path) -> Document:
     """
     text = _text(path)
     try:
+        _check_events(text)
         loader = _Loader(text)
         try:
             node = loader.get_single_node()
@@ -119,8 +116,6 @@ def read_yaml(path: Path) -> Document:
         raise _syntax_error(path, error) from error
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise UserError(f"not YAML: {error}", file=path, remedy="write plain YAML text") from error
-    except RecursionError as error:
-        raise UserError("nested too deeply", file=path, remedy="write it flatter") from error
     if node is None or not isinstance(data, dict):
         remedy = "write keys and values, such as `lattice:` and its keys below it"
         raise UserError("the file does not hold keys and values", file=path, remedy=remedy)
@@ -139,7 +134,7 @@ def skim_yaml(path: Path) -> dict[str, Any]:
 
 
 def _check_events(text: str) -> None:
-    """Refuses what `_Loader` refuses, and deep nesting, before a loader in C meets them."""
+    """Refuses aliases, tags and deep nesting before a loader in C meets them."""
     depth = 0
     for event in yaml.parse(text, Loader=yaml.CSafeLoader):
         _refuse(event)
