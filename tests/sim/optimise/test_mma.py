@@ -118,7 +118,7 @@ def test_designs_whose_constraints_cannot_be_evaluated_are_avoided() -> None:
             raise SimulationError("it snaps")
         return np.array([2.0 - x.sum()]), -np.ones((1, 2))
 
-    options = MmaOptions(evaluations=60)
+    options = MmaOptions(evaluations=30)
     found = minimise("mma", loss, constraints, np.zeros(2), (-2.0, 2.0), options)
     assert 0.5 < found.x[0] <= 0.6
     assert found.loss < 0.2 * found.evaluations[0].loss
