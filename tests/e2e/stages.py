@@ -25,11 +25,19 @@ class Built:
 
 
 def build(problem: Path, preset: str | None, folder: Path) -> Built:
-    """Designs by every method that the problem asks for, ships the better, simulates it."""
-    study, ways = _options(problem, preset), []
-    for method in load(problem, preset).optimiser.methods.chosen:
+    """Designs by every method that the problem asks for, ships the better, simulates it.
+
+    Where a preset starts from the study's design, that is built first.
+    """
+    study, ways, wanted = _options(problem, preset), [], load(problem, preset).optimiser
+    start = []
+    if wanted.start == "study":
+        (folder / "study").mkdir()
+        build(problem, None, folder / "study")
+        start = ["--start", str(folder / "study/design.nc")]
+    for method in wanted.methods.chosen:
         ways.append(str(folder / f"design_{method}.nc"))
-        assert run_stage("design", [*study, "--method", method, "--out", ways[-1]]) == 0
+        assert run_stage("design", [*study, *start, "--method", method, "--out", ways[-1]]) == 0
     shipped, response = folder / "design.nc", folder / "response.nc"
     assert run_stage("select", [*study, "--designs", *ways, "--out", str(shipped)]) == 0
     assert run_stage("simulate", [*study, "--design", str(shipped), "--out", str(response)]) == 0
