@@ -8,6 +8,7 @@ heavy is imported here: this is the time one waits for "nothing to be done".
 import os
 import sys
 from collections.abc import Callable, Collection, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
@@ -18,7 +19,7 @@ from pipeline.problem.sections import design_name, group_count, split_name
 from pipeline.problem.sections import designs as designs_section
 from pipeline.runtime import RUN_MARK, WORK, UserError
 from pipeline.workflow import study_lock
-from pipeline.workflow.recordings import shown_recordings
+from pipeline.workflow.recordings import recording_pages, shown_recordings
 from pipeline.workflow.studies import (
     Study,
     asked_for,
@@ -28,6 +29,7 @@ from pipeline.workflow.studies import (
     families,
     problem_of,
     studies,
+    targets,
     together,
 )
 
@@ -67,6 +69,24 @@ def product_pages(built: str, product: str) -> list[str]:
     """Lists the pages of a product (`fabrication`, say) of a study, or of all of a figure."""
     names = together().get(built) or [Study.parse(built)]
     return [f"results/{study}/{product}/index.html" for study in names]
+
+
+def products(words: Collection[str]) -> dict[str, list[str]]:
+    """Maps the targets of products (`fig2_sweep`, say) that words name to their pages.
+
+    Where a list of rules is asked for, of all products: some six hundred, and as many rules take a
+    quarter of the time in which nothing is found to be done.
+    """
+    known: dict[str, Callable[[], list[str]]] = {}
+    for target, built in targets().items():
+        known[f"{target}_recordings"] = partial(recording_pages, built)
+        for made in ("fabrication", "spectrum", "sweep", "certificate"):
+            known[f"{target}_{made}"] = partial(product_pages, built, made)
+        study = Study.parse(built).name
+        for made in ("gains", "front"):
+            known[f"{study}_{made}"] = partial(list, [f"results/{study}/{made}/index.html"])
+    listed = any(word.startswith("--list") or word in {"-l", "--lt"} for word in words)
+    return {target: pages() for target, pages in known.items() if listed or target in words}
 
 
 def packages(wildcards: Wildcards) -> list[str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.workflow.rule_inputs import check_room
+from pipeline.workflow.rule_inputs import check_room, products
 from tests.workflow.conftest import Sandbox
 
 STUDY = {"design": 2, "select": 1, "simulate": 1, "as_built": 1, "sweep": 4, "sweep_gather": 1}
@@ -45,6 +45,14 @@ def test_studies_from_nothing(sandbox: Sandbox) -> None:
     assert planned["report"] + 1 == len(figures)  # none of the variants
     assert planned["movie"] == 4
     assert sandbox.planned("index") == {"index": 1}
+
+
+def test_products_have_rules_where_they_are_asked_for() -> None:
+    assert products(["fig2_sweep", "fig4"]) == {"fig2_sweep": ["results/fig2/sweep/index.html"]}
+    listed = products(["--list-target-rules"])
+    assert {"fig2_sweep", "fig3@quick.2_fabrication", "fig6_recordings", "fig7_front"} <= set(
+        listed
+    )
 
 
 def test_datasets_and_designs_are_those_that_the_problem_asks_for(sandbox: Sandbox) -> None:
