@@ -74,7 +74,7 @@ def product_pages(built: str, product: str) -> list[str]:
 def products(words: Collection[str]) -> dict[str, list[str]]:
     """Maps the targets of products (`fig2_sweep`, say) that words name to their pages.
 
-    Where a list of rules is asked for, of all products: some six hundred, and as many rules take a
+    Where a list of rules is asked for, of all products: some nine hundred, and as many rules take a
     quarter of the time in which nothing is found to be done.
     """
     known: dict[str, Callable[[], list[str]]] = {}

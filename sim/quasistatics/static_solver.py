@@ -73,7 +73,7 @@ class StaticSolver:
         """See ``Solver``."""
         top = self.topology
         check_connected(top)
-        loads = drive.values(top.held, self._passed)
+        loads = drive.values(top.held, self.passed)
         branch = _empty_branch(len(loads), top.n_dofs)
         counts = np.zeros(4, dtype=np.int64)
         bends, trusted = self._known(branch.states)
@@ -117,8 +117,8 @@ class StaticSolver:
     def _record(self, branch: Branch, counts: Ints) -> StaticRecord:
         """Keeps the output loads of all that were passed."""
         last = slice(self.substeps - 1, None, self.substeps)
-        before = np.concatenate([[0.0], self._passed[:-1]])
-        snapped = (before + branch.snapped * (self._passed - before)).reshape(-1, self.substeps)
+        before = np.concatenate([[0.0], self.passed[:-1]])
+        snapped = (before + branch.snapped * (self.passed - before)).reshape(-1, self.substeps)
         places = branch.snaps[np.isfinite(branch.snaps)]
         ways = np.minimum(places.astype(np.int64), len(before) - 1)
         return StaticRecord(
@@ -130,12 +130,12 @@ class StaticSolver:
             branch.eigenvalue[last].copy(),
             counts,
             self.topology,
-            before[ways] + (places - ways) * (self._passed - before)[ways],
+            before[ways] + (places - ways) * (self.passed - before)[ways],
         )
 
     @property
-    def _passed(self) -> Floats:
-        """(n_times * substeps,) load parameters of all loads passed; the path starts at zero."""
+    def passed(self) -> Floats:
+        """Lists the load parameters (n_times * substeps,) of all loads; the path starts at zero."""
         way = np.diff(self.output_times, prepend=0.0)
         left = np.arange(self.substeps - 1, -1, -1) / self.substeps
         return (self.output_times[:, None] - way[:, None] * left).ravel()

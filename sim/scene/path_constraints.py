@@ -79,7 +79,7 @@ class PathConstraints:
         share, solver = scene.objective.snap_margin, plan.solver
         self.geometry, self._solver, self._foil = geometry, solver, scene.objective.foil
         self._path = solver
-        if isinstance(solver, StaticSolver):
+        if isinstance(solver, StaticSolver) and share is not None:
             # strains are those of the whole path, eigenvalues need none beyond a snap
             self._path = replace(plan.confirming, leaves=self._foil is not None)
             ends = solver.output_times
@@ -174,7 +174,7 @@ class PathConstraints:
         """Finds the smallest eigenvalue at some loads; infinite if the path ends before them."""
         reached = passed[np.isfinite(record.states[passed]).all(axis=1)]
         if not len(reached):
-            return np.inf, ConcreteParameters(*(np.zeros_like(part) for part in values))
+            return _beyond(values)
         softest = reached[record.eigenvalue[reached].argmin()]
         topology = record.topology or self._solver.topology
         return eigenvalue_and_slopes(topology, values, record.states[softest])
@@ -183,10 +183,9 @@ class PathConstraints:
         self, values: ConcreteParameters, drive: PrescribedMotion, record: StaticRecord, way: int
     ) -> Slope:
         """Finds that of the softest point between a load and the one before; infinite if none."""
-        nothing = np.inf, ConcreteParameters(*(np.zeros_like(part) for part in values))
         before = record.states[way - 1] if way else np.zeros_like(record.states[way])
         if not np.isfinite(before).all():
-            return nothing
+            return _beyond(values)
         loads = np.append(0.0, self._path.output_times)
         begin, end = float(loads[way]), float(loads[way + 1])
         topology = record.topology or self._solver.topology
@@ -197,7 +196,7 @@ class PathConstraints:
             LOG.debug("a snap at %.3g of the load: smallest eigenvalue %.2g N/mm", share, value)
         if record.jumped[way] and not folds:  # nothing leads out of this snap
             check_unsnapped(record, loads[-1])
-        return nothing if found is None else (found.eigenvalue, found.slopes)
+        return _beyond(values) if found is None else (found.eigenvalue, found.slopes)
 
     def _strains(
         self, values: ConcreteParameters, motion: Floats, records: Records
@@ -211,6 +210,11 @@ class PathConstraints:
             through = adjoint_cases(self._path, alone, bar, np.zeros_like(bar)).parameters
             parts = (-one - other for one, other in zip(direct, through, strict=True))
             yield 1.0 - float(ratio), ConcreteParameters(*map(np.asarray, parts))
+
+
+def _beyond(values: ConcreteParameters) -> Slope:
+    """Stands for the eigenvalue where a path does not go."""
+    return np.inf, ConcreteParameters(*(np.zeros_like(part) for part in values))
 
 
 def _strain_and_slopes(

@@ -43,11 +43,9 @@ class Plan:
     def confirming(self) -> StaticSolver:
         """Follows the paths of a static scene through all loads that confirm a loss."""
         assert isinstance(self.solver, StaticSolver)
-        if self.passed is not None:
-            return replace(self.solver, output_times=self.passed)
-        ends = self.solver.output_times
-        way, left = np.diff(ends, prepend=0.0), np.arange(CONFIRMING - 1, -1, -1) / CONFIRMING
-        return replace(self.solver, output_times=(ends[:, None] - way[:, None] * left).ravel())
+        finer = replace(self.solver, substeps=CONFIRMING)
+        loads = finer.passed if self.passed is None else self.passed
+        return replace(self.solver, output_times=loads)
 
     def describe(self) -> str:
         """Says the plan in words, a line a decision."""
