@@ -81,12 +81,16 @@ def locate_lattice(
     vectors = (ends[:, 1] - ends[:, 0]) @ np.array([1, 1j])
     pitch = scale * float(np.median(np.abs(vectors)))
     gap = float(minimum_spanning_tree(cdist(points, points)).max())
+    joined = float(np.median(np.ptp(ends, axis=1).max(axis=1)))
+    reach = _FRONTIER * joined, _FRONTIER * max(joined, gap)
     found: list[Placement] = []
     for factor in _linear_factors(vectors, patches, scale, pitch, most_turn):
         turned = _turned(points, factor)
+        shifts, wide = _shifts(turned, patches, _BIN * pitch), pitch * abs(factor) / scale
+        matches = _first_matches(turned, joint, shifts, patches, _NEAR * wide)
         seeds = [
-            _Growth(points, joint, gap, turned + shift, patches, pitch * abs(factor) / scale)
-            for shift in _shifts(turned, patches, _BIN * pitch)
+            _Growth(points, reach, turned + shift, patches, wide, match)
+            for shift, match in zip(shifts, matches, strict=True)
         ]
         for seed in _likeliest(seeds, inside):
             grown = seed.placement(factor, inside)
@@ -160,33 +164,43 @@ def _shifts(turned: Floats, patches: Floats, width: float) -> Floats:
     return np.asarray(low + places[order] * width)
 
 
+def _first_matches(
+    turned: Floats, joint: Ints, shifts: Floats, patches: Floats, gate: float
+) -> Ints:
+    """Finds the patches (n_shifts, units) at shifted units, -1 for none: largest joined part each.
+
+    A unit and its patch are each other's nearest, no farther than ``gate``.
+    """
+    number = np.arange(len(turned))
+    distance, near = cKDTree(patches).query(turned + shifts[:, None], distance_upper_bound=gate)
+    back = cKDTree(turned).query(patches - shifts[:, None])[1]
+    near = np.where(np.isfinite(distance), near, 0)
+    known = np.isfinite(distance) & (np.take_along_axis(back, near, axis=1) == number)
+    shift, both = np.nonzero(known[:, joint].all(axis=2))
+    ends = (joint[both] + len(number) * shift[:, None]).T
+    graph = coo_array((np.ones(ends.shape[1]), tuple(ends)), (known.size, known.size))
+    part = connected_components(graph, directed=False)[1]
+    size = np.bincount(part[known.ravel()], minlength=known.size)[part] * known.ravel()
+    part, size = part.reshape(known.shape), size.reshape(known.shape)
+    largest = np.take_along_axis(part, size.argmax(axis=1)[:, None], axis=1)
+    return np.where(known & (part == largest), near, -1)
+
+
 class _Growth:
     """Grows a match from where a linear map agrees with the patches, over the joints."""
 
     def __init__(
         self,
         points: Floats,
-        joint: Ints,
-        gap: float,
+        reach: tuple[float, float],
         linear: Floats,
         patches: Floats,
         pitch: float,
+        match: Ints,
     ) -> None:
         self._points, self._linear, self._patches, self._pitch = points, linear, patches, pitch
-        self._reach = _FRONTIER * float(np.median(np.ptp(points[joint], axis=1).max(axis=1)))
-        self._widest = max(self._reach, _FRONTIER * gap)
-        self._patch = np.full(len(points), -1)
-        unit, patch = match_one_to_one(linear, patches, _NEAR * pitch)
-        self._patch[unit] = patch
-        self._keep_largest_part(joint)
-
-    def _keep_largest_part(self, joint: Ints) -> None:
-        both = joint[(self._patch[joint] >= 0).all(axis=1)]
-        shape = (len(self._points),) * 2
-        graph = coo_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape)
-        _, part = connected_components(graph, directed=False)
-        size = np.bincount(part[self._patch >= 0], minlength=1)
-        self._patch[part != size.argmax()] = -1
+        self._reach = reach  # over the joints, and over gaps between parts of a design
+        self._patch = match.copy()  # (units,) of every unit, -1 for none
 
     @property
     def size(self) -> int:
@@ -205,7 +219,7 @@ class _Growth:
 
     def placement(self, factor: complex, inside: Inside) -> Placement | None:
         """Returns the match at its largest; nothing if it is small."""
-        for reach in (self._reach, self._widest):  # parts of a design may lie apart
+        for reach in self._reach:
             self._grow(reach)
         if self.size < _LEAST:
             return None
@@ -263,7 +277,7 @@ class _Growth:
         count = min(_NEAREST + 1, len(known))
         far, near = cKDTree(self._points[known]).query(self._points, k=count)
         other = known[near] != np.arange(len(self._points))[:, None]
-        offset = (self._points[known][near] - self._points[:, None]) / self._reach
+        offset = (self._points[known][near] - self._points[:, None]) / self._reach[0]
         rows = np.concatenate([offset, np.ones((*near.shape, 1))], axis=2) * other[..., None]
         normal = np.einsum("uki,ukj->uij", rows, rows) + _RIDGE * np.diag([1.0, 1.0, 1e-6])
         right = np.einsum("uki,ukj->uij", rows, off[near])

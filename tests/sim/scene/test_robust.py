@@ -38,7 +38,7 @@ def robust(angles: Floats = ANGLES) -> Scene:
 
 @pytest.mark.parametrize("sharpness", [pytest.param(1.0, marks=pytest.mark.slow), 8.0])
 def test_the_evaluator_is_the_derivative_of_the_p_mean_over_copies(sharpness: float) -> None:
-    posed = robust(ANGLES[1:2]).updated(copy_sharpness=sharpness)
+    posed = robust(ANGLES[1:2]).updated(copy_sharpness=sharpness, duration=0.05)
     evaluate = Evaluator(posed, make_plan(posed))
     design = design_of(posed, 0.2)
     value, gradient, each = evaluate(design)
