@@ -79,7 +79,7 @@ def sample_specimens(
 
 def _solver(scene: Scene, vertices: Floats, times: Floats) -> Solver:
     """The plan's solver; of a path of equilibria, with the steps of the structure as designed."""
-    plan = make_plan(scene, vertices, times)
+    plan = make_plan(scene, vertices, times, gradient=False)
     solver = plan.solver
     if not isinstance(solver, StaticSolver):
         return solver

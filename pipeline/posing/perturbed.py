@@ -120,7 +120,7 @@ def _outcomes(
     threads: int,
 ) -> Iterator[list[Outcome[PerturbedResponse]]]:
     """Outcomes of the load cases of every copy; none of a copy that cannot be made."""
-    plan = make_plan(scene, vertices, sample_times(scene), every_case=True)
+    plan = make_plan(scene, vertices, sample_times(scene), every_case=True, gradient=False)
     cases = (
         case
         for imperfect, copy in copies

@@ -82,7 +82,7 @@ def _simulated(structure: PosedStructure, target: Floats | None, threads: int) -
     """Simulates loss and smallest void angle of a structure in each load case."""
     scene, vertices = structure
     try:
-        plan = make_plan(scene, vertices, threads=threads)
+        plan = make_plan(scene, vertices, threads=threads, gradient=False)
     except SimulationError as error:
         return iter([Outcome(None, str(error), error)] * len(scene.loads.motions))
 

@@ -131,4 +131,5 @@ def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
 
 
 def _of(scene: Scene, vertices: NDArray[np.float64]) -> float:
-    return float(simulate(scene, vertices=vertices, plan=make_plan(scene, vertices)).loss)
+    plan = make_plan(scene, vertices, gradient=False)
+    return float(simulate(scene, vertices=vertices, plan=plan).loss)

@@ -11,7 +11,7 @@ from sim.scene.equal_cases import equal_cases
 from sim.scene.parameter_map import concrete_parameters
 from sim.scene.scene import Scene
 from sim.scene.soundness import check_scene
-from sim.scene.time_solver import time_solver
+from sim.scene.time_solver import time_solver, without_gradient
 from sim.solvers import Solver, check_free_dofs
 from sim.structure import ConcreteParameters
 from sim.time_integration import ImplicitSolver
@@ -67,6 +67,7 @@ def make_plan(
     times: Floats | None = None,
     threads: int = 1,
     every_case: bool = False,
+    gradient: bool = True,
 ) -> Plan:
     """Decides how to simulate a scene.
 
@@ -77,6 +78,7 @@ def make_plan(
         times: (n_times,) of the output, s; None for the loss's own samples.
         threads: cases to solve side by side.
         every_case: whether the motion of each load case is wanted, and not its loss alone.
+        gradient: whether derivatives are wanted; without, stages are solved as motions need it.
 
     Raises:
         SimulationError: nothing can move, or nothing acts on what does.
@@ -113,6 +115,9 @@ def make_plan(
         integrator = "implicit" if isinstance(solver, ImplicitSolver) else "explicit"
         if isinstance(solver, ImplicitSolver):
             skipped.append(_contact_line(values, solver))
+            if not gradient:
+                solver = loose = without_gradient(scene, values, solver)
+                skipped.append(f"accuracy for a gradient: stages to {loose.tolerance:.1g} mm/s")
         elif vertices is None:
             megabytes = solver.adjoint_memory() / 1e6
             decisions.append(f"adjoint: checkpoints, {megabytes:.0f} MB a case")

@@ -42,6 +42,9 @@ STIFFENING = 1.7
 
 NEWTON = 1e-6
 """Tolerance of the stage velocities, mm/s: losses are smooth to 1e-13, gradients exact to 1e-6."""
+STAGE_SHARE = 0.1
+"""That of a motion without a gradient, over the drive's size and frequency times the error that the
+accuracy allows a motion: it makes a hundredth of that error, and takes half as many iterations."""
 IMPLICIT_ORDER, EXPLICIT_ORDER = 0.6, 3.0
 MOST_PARTS = 8
 EXPLICIT_STEPS = 6
@@ -153,11 +156,22 @@ def _implicit_first(
     return driven < slow * lowest
 
 
+def without_gradient(
+    scene: Scene, values: ConcreteParameters, solver: ImplicitSolver
+) -> ImplicitSolver:
+    """Loosens the tolerance of the stages to what the motion itself needs."""
+    rate = scene.loads.drive_frequency or 1.0 / float(solver.times[-1])
+    stops = np.zeros(0)
+    size = min(_size(solver, values, drive, stops) for drive in different_drives(scene))
+    loosest = STAGE_SHARE * RULES[scene.numerics.accuracy].motion * size * rate
+    return replace(solver, tolerance=max(NEWTON, loosest))
+
+
 class _Error:
     """Compares solutions of all different drives with what the accuracy allows."""
 
     def __init__(self, scene: Scene, values: ConcreteParameters) -> None:
-        self._values, self._drives = values, different_drives(scene)
+        self._scene, self._values, self._drives = scene, values, different_drives(scene)
         self._rule, self._accuracy = RULES[scene.numerics.accuracy], scene.numerics.accuracy
         region, every = scene.objective.region, np.arange(scene.lattice.n_units)
         self._units = region if len(region) else np.setdiff1d(every, scene.loads.driven)
@@ -168,8 +182,11 @@ class _Error:
 
         Also returns the solver with the steps that had to be cut on the way.
         """
+        loose: TimeSolver = solver
+        if isinstance(solver, ImplicitSolver):
+            loose = without_gradient(self._scene, self._values, solver)
         try:
-            solved = [solve_case(solver, self._values, drive) for drive in self._drives]
+            solved = [solve_case(loose, self._values, drive) for drive in self._drives]
         except SimulationError:
             return None, solver
         moved = [u.reshape(len(u), -1, 3)[:, self._units] / self._scales for u, _, _ in solved]

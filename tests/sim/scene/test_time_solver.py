@@ -84,6 +84,30 @@ def test_steps_are_guessed_without_a_solve(motion: sim.MotionLaw, duration: floa
     assert 0.5 < guessed / steps < 2
 
 
+@pytest.mark.parametrize(
+    ("motion", "fewer"),
+    [
+        (DRIVES["slow"], 0.8),
+        (DRIVES["near the lowest eigenfrequency"], 0.8),
+        (sim.Harmonic(3e-3, 5.0, 0.6), 1.0),
+    ],
+)
+def test_stages_are_solved_as_a_motion_needs_it_where_no_gradient_does(
+    motion: sim.MotionLaw, fewer: float
+) -> None:
+    scene = posed(motion, integrator="implicit", accuracy="draft")
+    still = scene.lattice.vertices
+    motions, gradients = [], []
+    for gradient in (True, False):
+        plan = sim.make_plan(scene, still, gradient=gradient)
+        found = sim.simulate(scene, vertices=still, plan=plan)
+        motions.append(found.displacement[..., scene.objective.region, :] / scales(15.0))
+        gradients.append(found.records[0].counts[0])
+    apart = np.linalg.norm(motions[1] - motions[0]) / np.linalg.norm(motions[0])
+    assert apart < RULES["draft"].motion / 20
+    assert gradients[1] <= fewer * gradients[0]
+
+
 def test_a_straight_series_has_no_kinks() -> None:
     ramp = np.outer(KNOTS, [1.0, 2.0, 0.0])
     assert len(breakpoints(sim.TimeSeries(KNOTS, ramp), 0.2)) == 0
