@@ -1,4 +1,5 @@
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -71,11 +72,14 @@ def test_a_build_that_fails_leaves_the_old_report(
     assert sorted(quick_report.parent.iterdir()) == beside
 
 
-def test_what_a_killed_build_left_goes(quick_report: Path, quick: StudyResults) -> None:
-    left = quick_report.with_name(f".{quick_report.name}.part")
+def test_what_a_killed_build_left_goes(quick: StudyResults, tmp_path: Path) -> None:
+    report, folder = replace(study_report(quick), figures={}, template=""), tmp_path / "report"
+    publish(report, folder)
+    left = tmp_path / ".report.part"
     left.mkdir()
-    (left / "index.html").write_text("half a page", encoding="utf-8")
-    before = contents(quick_report)
-    publish(study_report(quick), quick_report)
-    assert contents(quick_report) == before
+    (left / "facts.json").write_text("half a file", encoding="utf-8")
+    before = contents(folder)
+    publish(report, folder)
+    assert "facts.json" in before
+    assert contents(folder) == before
     assert not left.exists()
