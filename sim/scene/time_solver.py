@@ -7,14 +7,16 @@ Explicit steps, which cannot be longer than stable ones, are compared with the l
 """
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, TypeVar
 
 import numpy as np
 import scipy.sparse.linalg as spla
 
 from sim.core import Floats, SimulationError
+from sim.energy import Topology
 from sim.scene.scene import DIRECTED, Accuracy, Scene
 from sim.solvers import PrescribedMotion, Pulse, breakpoints, single_motions, solve_case
 from sim.structure import ConcreteParameters
@@ -91,7 +93,7 @@ def time_solver(
     What was decided is appended to `decisions`, a line each, and to `warnings` if the accuracy is
     not reached.
     """
-    error = _Error(scene, values)
+    error = _Error(scene, values, float(times[-1]))
     explicit = _explicit(scene, values, times, threads)
     if _implicit_first(scene, values, decisions):
         auto = scene.numerics.integrator == "auto"
@@ -156,26 +158,28 @@ def _implicit_first(
     return driven < slow * lowest
 
 
-def without_gradient(
-    scene: Scene, values: ConcreteParameters, solver: ImplicitSolver
-) -> ImplicitSolver:
-    """Loosens the tolerance of the stages to what the motion itself needs."""
-    rate = scene.loads.drive_frequency or 1.0 / float(solver.times[-1])
-    stops = np.zeros(0)
-    size = min(_size(solver, values, drive, stops) for drive in different_drives(scene))
-    loosest = STAGE_SHARE * RULES[scene.numerics.accuracy].motion * size * rate
-    return replace(solver, tolerance=max(NEWTON, loosest))
+def stage_tolerance(scene: Scene, values: ConcreteParameters, end: float) -> float:
+    """Bounds the error of stage velocities by what a motion until `end` itself needs, mm/s."""
+    drives, rate = different_drives(scene), scene.loads.drive_frequency or 1.0 / end
+    stops = _breakpoints(drives, end)
+    size = min(_size(scene.topology, end, values, drive, stops) for drive in drives)
+    return max(NEWTON, STAGE_SHARE * RULES[scene.numerics.accuracy].motion * size * rate)
 
 
 class _Error:
     """Compares solutions of all different drives with what the accuracy allows."""
 
-    def __init__(self, scene: Scene, values: ConcreteParameters) -> None:
-        self._scene, self._values, self._drives = scene, values, different_drives(scene)
+    def __init__(self, scene: Scene, values: ConcreteParameters, end: float) -> None:
+        self._scene, self._values, self._end = scene, values, end
+        self._drives = different_drives(scene)
         self._rule, self._accuracy = RULES[scene.numerics.accuracy], scene.numerics.accuracy
         region, every = scene.objective.region, np.arange(scene.lattice.n_units)
         self._units = region if len(region) else np.setdiff1d(every, scene.loads.driven)
         self._scales = np.array([scene.lattice.spacing, scene.lattice.spacing, 1.0])
+
+    @cached_property
+    def _tolerance(self) -> float:
+        return stage_tolerance(self._scene, self._values, self._end)
 
     def motions(self, solver: S) -> tuple[list[Floats] | None, S]:
         """Solves for the region's motions (n_times, n_region, 3); None if that fails.
@@ -184,7 +188,7 @@ class _Error:
         """
         loose: TimeSolver = solver
         if isinstance(solver, ImplicitSolver):
-            loose = without_gradient(self._scene, self._values, solver)
+            loose = replace(solver, tolerance=self._tolerance)
         try:
             solved = [solve_case(loose, self._values, drive) for drive in self._drives]
         except SimulationError:
@@ -301,26 +305,30 @@ def _first_grid(
     )
     steps, largest = _graded(scene, end)
     drives = different_drives(scene)
-    stops = np.unique(np.concatenate([breakpoints(each.motion, end) for each in drives]))
+    stops = _breakpoints(drives, end)
     solver = ImplicitSolver(
         scene.topology, steps, times, NEWTON, threads, turn_allowance=TURN_ALLOWANCE
     )
     if frequency is not None:
         return replace(solver, times=time_grid.through(steps, stops))
+    sizes = [_size(scene.topology, end, values, drive, stops) for drive in drives]
     grids = [
-        adapted(solver, values, drive, rule.per_step * _size(solver, values, drive, stops),
-                rule.first, largest, stops, most).times
-        for drive in drives
-    ]  # fmt: skip
+        adapted(solver, values, drive, rule.per_step * size, rule.first, largest, stops, most).times
+        for drive, size in zip(drives, sizes, strict=True)
+    ]
     return replace(solver, times=time_grid.through(grids[0], np.concatenate(grids)))
 
 
+def _breakpoints(drives: Sequence[PrescribedMotion], end: float) -> Floats:
+    return np.unique(np.concatenate([breakpoints(each.motion, end) for each in drives]))
+
+
 def _size(
-    solver: ImplicitSolver, values: ConcreteParameters, drive: PrescribedMotion, stops: Floats
+    top: Topology, end: float, values: ConcreteParameters, drive: PrescribedMotion, stops: Floats
 ) -> float:
     """Finds how far a drive goes, or its forces push slowly, mm (rotations times their scale)."""
-    top, held = solver.topology, solver.topology.unloaded.held
-    at = np.union1d(np.linspace(0.0, float(solver.times[-1]), SAMPLES), stops)
+    held = top.unloaded.held
+    at = np.union1d(np.linspace(0.0, end, SAMPLES), stops)
     size = np.abs(drive.values(top.held, at)[:, : len(held)] * top.scale[held]).max(initial=0.0)
     if len(drive.loaded) > 0:
         most = drive.forces(at)
