@@ -161,10 +161,18 @@ def note(
 
 
 def log_values(axes: Axes) -> None:
-    """Makes the y axis logarithmic, with plain numbers; what is not positive is left out."""
+    """Makes the y axis logarithmic, with plain numbers; what is not positive is left out.
+
+    Over more than three decades these alone have numbers: all would be many, and long.
+    """
+
+    def number(value: float, _: float) -> str:
+        low, high = axes.get_ylim()
+        return "" if high > 1e3 * low and not f"{value:.0e}".startswith("1e") else f"{value:g}"
+
     axes.set_yscale("log", nonpositive="mask")
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.yaxis.set_major_formatter(number)
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
