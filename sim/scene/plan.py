@@ -11,7 +11,7 @@ from sim.scene.equal_cases import equal_cases
 from sim.scene.parameter_map import concrete_parameters
 from sim.scene.scene import Scene
 from sim.scene.soundness import check_scene
-from sim.scene.time_solver import stage_tolerance, time_solver
+from sim.scene.time_solver import time_solver
 from sim.solvers import Solver, check_free_dofs
 from sim.structure import ConcreteParameters
 from sim.time_integration import ImplicitSolver
@@ -111,14 +111,12 @@ def make_plan(
         decisions.append(f"tangent: {scene.topology.numbering[1].describe()}")
         skipped.append("inertia and damping: the scene is static")
     else:
-        solver = time_solver(scene, values, times, threads, decisions, warnings)
+        solver = time_solver(scene, values, times, threads, decisions, warnings, gradient)
         integrator = "implicit" if isinstance(solver, ImplicitSolver) else "explicit"
         if isinstance(solver, ImplicitSolver):
             skipped.append(_contact_line(values, solver))
             if not gradient:
-                loosest = stage_tolerance(scene, values, float(times[-1]))
-                solver = replace(solver, tolerance=loosest)
-                skipped.append(f"accuracy for a gradient: stages to {loosest:.1g} mm/s")
+                skipped.append(f"accuracy for a gradient: stages to {solver.tolerance:.1g} mm/s")
         elif vertices is None:
             megabytes = solver.adjoint_memory() / 1e6
             decisions.append(f"adjoint: checkpoints, {megabytes:.0f} MB a case")

@@ -87,10 +87,12 @@ def time_solver(
     threads: int,
     decisions: list[str],
     warnings: list[str],
+    gradient: bool,
 ) -> TimeSolver:
     """Chooses the solver of a motion for a structure, with the output at `times` (n_times,), s.
 
-    What was decided is appended to `decisions`, a line each, and to `warnings` if the accuracy is
+    Without a `gradient` to be asked for, implicit stages are solved as motions need it. What was
+    decided is appended to `decisions`, a line each, and to `warnings` if the accuracy is
     not reached.
     """
     error = _Error(scene, values, float(times[-1]))
@@ -110,7 +112,7 @@ def time_solver(
             kind = "adapted" if scene.loads.drive_frequency is None else "graded"
             told = f"grid: {len(solver.times) - 1} {kind} steps over {times[-1]:.6g} s, frozen"
             decisions.extend([told, error.told(left, warnings)])
-            return solver
+            return solver if gradient else replace(solver, tolerance=error.tolerance)
         decisions.append("explicit: implicit steps as short as the accuracy asks for take longer")
     rough = replace(explicit, splitting=LEAPFROG, n_steps=_same_share(explicit.n_steps))
     most = 2**MOST_DOUBLINGS * explicit.n_steps
@@ -158,14 +160,6 @@ def _implicit_first(
     return driven < slow * lowest
 
 
-def stage_tolerance(scene: Scene, values: ConcreteParameters, end: float) -> float:
-    """Bounds the error of stage velocities by what a motion until `end` itself needs, mm/s."""
-    drives, rate = different_drives(scene), scene.loads.drive_frequency or 1.0 / end
-    stops = _breakpoints(drives, end)
-    size = min(_size(scene.topology, end, values, drive, stops) for drive in drives)
-    return max(NEWTON, STAGE_SHARE * RULES[scene.numerics.accuracy].motion * size * rate)
-
-
 class _Error:
     """Compares solutions of all different drives with what the accuracy allows."""
 
@@ -178,8 +172,12 @@ class _Error:
         self._scales = np.array([scene.lattice.spacing, scene.lattice.spacing, 1.0])
 
     @cached_property
-    def _tolerance(self) -> float:
-        return stage_tolerance(self._scene, self._values, self._end)
+    def tolerance(self) -> float:
+        """Bounds the error of stage velocities by what a motion itself needs, mm/s."""
+        scene, stops = self._scene, _breakpoints(self._drives, self._end)
+        rate = scene.loads.drive_frequency or 1.0 / self._end
+        sizes = [_size(scene.topology, self._end, self._values, d, stops) for d in self._drives]
+        return max(NEWTON, STAGE_SHARE * self._rule.motion * min(sizes) * rate)
 
     def motions(self, solver: S) -> tuple[list[Floats] | None, S]:
         """Solves for the region's motions (n_times, n_region, 3); None if that fails.
@@ -188,7 +186,7 @@ class _Error:
         """
         loose: TimeSolver = solver
         if isinstance(solver, ImplicitSolver):
-            loose = replace(solver, tolerance=self._tolerance)
+            loose = replace(solver, tolerance=self.tolerance)
         try:
             solved = [solve_case(loose, self._values, drive) for drive in self._drives]
         except SimulationError:
