@@ -9,8 +9,7 @@ import numpy as np
 from benchmarks.harness import Method, Run, Sample, Task, settings_of
 from benchmarks.scenes import LoadCase, case, counted, work_of
 from sim.core import Floats
-from sim.energy import Topology
-from sim.linalg import number_free_dofs
+from sim.linalg import OF_EQUILIBRIA, Storage
 from sim.quasistatics import StaticSolver
 from sim.scene import STIFFENING, GradientChain, ParameterMap, make_plan
 from sim.solvers import Solver, solve_cases
@@ -35,8 +34,8 @@ def in_time(name: str, halvings: int) -> tuple[Method, ...]:
     implicit = tuple(("steps / " + str(2**k) if k else "default", k) for k in range(halvings + 1))
     explicit = tuple((f"{2**k} × stable" if k else "stable", k) for k in range(halvings - 1))
     makes: dict[str, tuple[Make, tuple[tuple[str, float], ...]]] = {
-        "ESDIRK3, band": (partial(_implicit, False), implicit),
-        "ESDIRK3, fronts": (partial(_implicit, True), implicit[:2]),
+        "ESDIRK3, panels": (partial(_implicit, "panels"), implicit),
+        "ESDIRK3, fronts": (partial(_implicit, "fronts"), implicit[:2]),
         **{f"explicit {key}": (partial(_explicit, key), explicit) for key in SPLITTINGS},
     }
     return tuple(
@@ -50,10 +49,10 @@ def at_rest(name: str, tolerances: tuple[float, ...]) -> tuple[Method, ...]:
     return tuple(
         Method(
             f"Newton, {way}",
-            partial(_prepare, name, partial(_static, way == "fronts")),
+            partial(_prepare, name, partial(_static, way)),
             settings_of(tolerances),
         )
-        for way in ("band", "fronts")
+        for way in OF_EQUILIBRIA
     )
 
 
@@ -127,14 +126,7 @@ def warmed_up(run: Run) -> Run:
     return run
 
 
-def _stored(posed: LoadCase, by_fronts: bool) -> Topology:
-    """Returns the topology with its tangent as a band or by fronts."""
-    top = replace(posed.scene.topology)
-    top.__dict__["numbering"] = number_free_dofs(top.site, top.ligament_units, top.held, by_fronts)
-    return top
-
-
-def _implicit(by_fronts: bool, posed: LoadCase, halvings: float) -> Solver:
+def _implicit(storage: Storage, posed: LoadCase, halvings: float) -> Solver:
     asked = posed.scene.updated(integrator="implicit", accuracy="default")
     solver = make_plan(asked).solver
     assert isinstance(solver, ImplicitSolver)
@@ -142,7 +134,8 @@ def _implicit(by_fronts: bool, posed: LoadCase, halvings: float) -> Solver:
         refined_times(solver.times, int(halvings)),
         solver.tolerance / HALVING**halvings,
     )
-    return replace(solver, topology=_stored(posed, by_fronts), times=times, tolerance=tolerance)
+    top = replace(posed.scene.topology, storages=(storage,))
+    return replace(solver, topology=top, times=times, tolerance=tolerance)
 
 
 def refined_times(times: Floats, halvings: int) -> Floats:
@@ -162,5 +155,6 @@ def _explicit(key: str, posed: LoadCase, doublings: float) -> Solver:
     )
 
 
-def _static(by_fronts: bool, posed: LoadCase, relative: float) -> Solver:
-    return StaticSolver(_stored(posed, by_fronts), posed.times, relative=relative)
+def _static(storage: Storage, posed: LoadCase, relative: float) -> Solver:
+    top = replace(posed.scene.topology, storages=(storage,))
+    return StaticSolver(top, posed.times, relative=relative)

@@ -1,5 +1,6 @@
 """Measures the growth of an equilibrium with the lattice: squares compressed by a tenth at once."""
 
+from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
@@ -20,7 +21,7 @@ from benchmarks.harness import (
 )
 from benchmarks.scenes import HEAVY, work_of
 from sim.energy import Topology, observe, topology
-from sim.linalg import number_free_dofs
+from sim.linalg import OF_EQUILIBRIA, Storage
 from sim.quasistatics import StaticSolver
 from sim.solvers import LinearRamp, PrescribedMotion, concrete, held_dofs, solve_case
 from sim.structure import ConcreteParameters, VoidAngleContact, parameters_at, quads
@@ -38,7 +39,7 @@ def suite() -> Suite:
     """Makes the suite."""
     chosen = [Method(_name(side), partial(_solve, side), repeats=3) for side in SIDES]
     banded = [
-        Method(f"{_name(side)}, band", partial(_solve, side, by_fronts=False), repeats=2)
+        Method(f"{_name(side)}, band", partial(_solve, side, ("band",)), repeats=2)
         for side in SIDES
         if 15 < side <= ALL_IN_BANDS
     ]
@@ -112,13 +113,12 @@ def strict(sides: tuple[int, ...]) -> Run:
 
 def grown(way: str, side: float, _: str) -> Run:
     """Prepares one size by one of the WAYS."""
-    return _solve(int(side), None if way == "Newton, by size" else False)
+    return _solve(int(side), OF_EQUILIBRIA if way == "Newton, by size" else ("band",))
 
 
-def _solve(side: int, by_fronts: bool | None = None) -> Run:
+def _solve(side: int, storages: tuple[Storage, ...] = OF_EQUILIBRIA) -> Run:
     top, values, drive = _posed(side)
-    top.__dict__["numbering"] = number_free_dofs(top.site, top.ligament_units, top.held, by_fronts)
-    solver = StaticSolver(top, np.ones(1))
+    solver = StaticSolver(replace(top, storages=storages), np.ones(1))
 
     def run() -> Sample:
         states, _, record = solve_case(solver, values, drive)

@@ -10,7 +10,7 @@ import numpy as np
 from sim.collision import CandidatePairs, find_candidate_pairs
 from sim.core import Floats, Ints
 from sim.energy.network_arrays import NetworkArrays
-from sim.linalg import Pattern, number_free_dofs
+from sim.linalg import OF_EQUILIBRIA, Pattern, Storage, block_entries, number_free_dofs
 from sim.structure import (
     ConcreteParameters,
     ContactModel,
@@ -33,12 +33,21 @@ class Topology:
     rotation_scale: float  # length that makes rotations comparable with displacements, mm
     contact: VoidAngleContact | CandidatePairs  # law, or what the law on distances acts on
     loaded: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # (n_loaded,) units
+    storages: tuple[Storage, ...] = OF_EQUILIBRIA  # of the tangent, to choose from
 
     @cached_property
     def numbering(self) -> tuple[Ints, Pattern]:
         """Number of each dof among the free ones (-1 if held), and the tangent's pattern."""
-        free, pattern = number_free_dofs(self.site, self.coupled_units, self.unloaded.held)
+        free, pattern = number_free_dofs(
+            self.site, self.coupled_units, self.unloaded.held, self.storages
+        )
         return np.append(free, np.full(3 * len(self.loaded), -1)), pattern
+
+    @cached_property
+    def entries(self) -> Ints:
+        """(n_ligaments, 21) where the ligaments' blocks lie in the tangent (`block_entries`)."""
+        free, pattern = self.numbering
+        return block_entries(pattern, free, self.ligament_units)
 
     @property
     def unloaded(self) -> Topology:

@@ -21,7 +21,6 @@ import numpy as np
 
 from sim.core import Floats, Ints, compiled
 from sim.energy.network_arrays import Kinematics, NetworkArrays, Sensitivity
-from sim.linalg import Matrix, entry
 
 
 @compiled
@@ -206,32 +205,22 @@ def _ligament_block(
 
 @compiled
 def tangent(
-    motion: Floats, net: NetworkArrays, kinematics: Kinematics, free: Ints, matrix: Matrix
+    motion: Floats, net: NetworkArrays, kinematics: Kinematics, entries: Ints, values: Floats
 ) -> None:
-    """Adds the energy's Hessian among the free dofs to a matrix.
+    """Adds the energy's Hessian among the free dofs to the values of a matrix.
 
-    ``free`` (3 n_units,) numbers the free dofs and is negative for the others.
+    ``entries`` (n_ligaments, 21) are the places of each ligament's block (``block_entries``).
     """
     turn, shears = kinematics.turn, kinematics.shear
-    block, place = np.empty((6, 6)), np.empty(6, dtype=np.int64)
-    # taken apart here: passing the matrix for each entry would cost more than all the rest
-    values, width, fronts = matrix.values, matrix.pattern.size[1], matrix.pattern.fronts
-    owner, first, edge = fronts.owner, fronts.first, fronts.edge
-    boundary, panel = fronts.boundary, fronts.panel
+    block = np.empty((6, 6))
     for k in range(net.unit.shape[0]):
         _ligament_block(k, motion, turn, shears[k], net, block)
-        for m in range(3):
-            place[m] = free[3 * net.unit[k, 0] + m]
-            place[3 + m] = free[3 * net.unit[k, 1] + m]
+        m = 0
         for row in range(6):
             for column in range(row + 1):
-                i, j = max(place[row], place[column]), min(place[row], place[column])
-                if j < 0:
-                    continue
-                if width >= 0:
-                    values[j * width + i] += block[row, column]
-                else:
-                    at = entry(i, j, owner, first, edge, boundary, panel)
+                at = entries[k, m]
+                m += 1
+                if at >= 0:
                     values[at] += block[row, column]
 
 

@@ -27,6 +27,7 @@ class System(NamedTuple):
     loaded: Ints  # (n_loaded,) units under dead loads, whose three components are the last dofs
     scale: Floats  # (n_dofs,) weights that make rotations comparable with displacements, mm
     pattern: Pattern  # of the tangent
+    entries: Ints  # (n_ligaments, 21) where the ligaments' blocks lie in the tangent
 
 
 class Workspace(NamedTuple):
@@ -87,6 +88,7 @@ def system_of(
         loaded=topology.loaded,
         scale=topology.scale,
         pattern=pattern,
+        entries=topology.entries,
     )
 
 

@@ -48,7 +48,7 @@ def gradient(
 @compiled
 def tangent(motion: Floats, system: System, kinematics: Kinematics, matrix: Matrix) -> None:
     """Adds the energy's Hessian among the free dofs to a matrix."""
-    ligament_kernels.tangent(motion, system.net, kinematics, system.free, matrix)
+    ligament_kernels.tangent(motion, system.net, kinematics, system.entries, matrix.values)
     void_contact_kernels.add_tangent(motion, system.net, system.free, matrix)
     if len(system.contacts.pairs) > 0:
         given = (motion, system.contacts, system.free, matrix)

@@ -1,4 +1,4 @@
-"""Factorises and solves symmetric sparse systems: banded, or by nested dissection."""
+"""Factorises and solves symmetric sparse systems: banded, by panels or by nested dissection."""
 
 import lazy_loader as lazy
 

@@ -1,8 +1,12 @@
-from .multifrontal import entry as entry
+from .symmetric import OF_EQUILIBRIA as OF_EQUILIBRIA
+from .symmetric import OF_MOTIONS as OF_MOTIONS
 from .symmetric import Matrix as Matrix
 from .symmetric import Pattern as Pattern
+from .symmetric import Storage as Storage
 from .symmetric import add as add
+from .symmetric import block_entries as block_entries
 from .symmetric import clear as clear
+from .symmetric import entry as entry
 from .symmetric import factorise as factorise
 from .symmetric import matrix as matrix
 from .symmetric import number_free_dofs as number_free_dofs

@@ -60,19 +60,26 @@ def number_free_dofs(n_units: int, unit_pairs: Ints, held: Ints) -> tuple[NDArra
         bandwidth.
     """
     order = min(
-        (np.arange(n_units), _cuthill_mckee(n_units, unit_pairs)),
+        (np.arange(n_units), cuthill_mckee(n_units, unit_pairs)),
         key=lambda units: _unit_bandwidth(units, unit_pairs),
     )
-    is_free = np.ones(3 * n_units, dtype=bool)
-    is_free[held] = False
-    dofs = (3 * order[:, None] + np.arange(3)).ravel()
-    dofs = dofs[is_free[dofs]]
-    free = np.full(3 * n_units, -1, dtype=np.int64)
-    free[dofs] = np.arange(len(dofs))
+    free = number_in_order(order, held)
     return free, _bandwidth(free, unit_pairs)
 
 
-def _cuthill_mckee(n_units: int, unit_pairs: Ints) -> Ints:
+def number_in_order(order: Ints, held: Ints) -> NDArray[np.int64]:
+    """Numbers the dofs (3 n_units,) that are not held, three a unit, in an order of the units."""
+    is_free = np.ones(3 * len(order), dtype=bool)
+    is_free[held] = False
+    dofs = (3 * order[:, None] + np.arange(3)).ravel()
+    dofs = dofs[is_free[dofs]]
+    free = np.full(3 * len(order), -1, dtype=np.int64)
+    free[dofs] = np.arange(len(dofs))
+    return free
+
+
+def cuthill_mckee(n_units: int, unit_pairs: Ints) -> Ints:
+    """Orders units by the reverse Cuthill-McKee method."""
     graph = sp.csr_matrix(
         (np.ones(len(unit_pairs)), (unit_pairs[:, 0], unit_pairs[:, 1])), shape=(n_units, n_units)
     )

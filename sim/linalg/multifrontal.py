@@ -12,7 +12,7 @@ from sim.linalg.nested_dissection import Fronts
 
 
 @compiled
-def entry(
+def entry_of_fronts(
     row: int, column: int, owner: Ints, firsts: Ints, edge: Ints, boundary: Ints, panel: Ints
 ) -> int:
     """Finds the entry (row >= column) among the factor's values; its dofs must be coupled.

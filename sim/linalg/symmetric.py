@@ -1,37 +1,64 @@
-"""Stores the tangent, a symmetric matrix, as a band or by fronts, whichever is solved faster.
+"""Stores the tangent, a symmetric matrix, as a band, by panels or by fronts.
 
-Both are filled entry by entry, factorised in place and solved with through the same functions.
+All are filled entry by entry, factorised in place and solved with through the same functions.
 """
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from sim.core import Floats, Ints, compiled
 from sim.linalg import banded as band
-from sim.linalg.multifrontal import entry, factorise_fronts, solve_fronts
+from sim.linalg.multifrontal import entry_of_fronts, factorise_fronts, solve_fronts
 from sim.linalg.nested_dissection import Fronts, dissect, fronts_of, no_fronts
+from sim.linalg.panels import (
+    Panels,
+    entry_of_panels,
+    factorise_panels,
+    fill_padding,
+    no_panels,
+    panels_of,
+    reach_of,
+    solve_panels,
+)
+from sim.linalg.row_products import WIDTH
 
-NARROW_FLOP, BAND_FLOP, FRONT_FLOP, FRONT_CALL = 72e-12, 42e-12, 58e-12, 2e-6
+NARROW_FLOP, BAND_FLOP, FRONT_FLOP, FRONT_CALL, PANEL_FLOP = 72e-12, 42e-12, 58e-12, 2e-6, 72e-12
 """Seconds of one core for a multiplication of each method, and for a front's calls."""
+
+Storage = Literal["band", "panels", "fronts"]
+
+OF_EQUILIBRIA: tuple[Storage, ...] = ("band", "fronts")
+"""Storages that equilibria choose from. Panels would be as fast as in motions; but designs of
+equilibria are pinned to the last bit, and each way to solve rounds in its own way."""
+OF_MOTIONS: tuple[Storage, ...] = ("panels", "fronts")
+
+BY_FRONTS, BY_PANELS = -1, -2
 
 
 class Pattern(NamedTuple):
     """Layout of the entries."""
 
-    size: Ints  # (2,) number of dofs, and half bandwidth; the latter is -1 if stored by fronts
-    fronts: Fronts  # none if stored as a band
+    size: Ints  # (2,) number of dofs, and half bandwidth; BY_FRONTS or BY_PANELS if so stored
+    fronts: Fronts  # none if stored otherwise
+    panels: Panels  # likewise
 
     @property
-    def by_fronts(self) -> bool:
-        """Tells storage by fronts from a band."""
-        return bool(self.size[1] < 0)
+    def storage(self) -> Storage:
+        """Names the storage."""
+        width = self.size[1]
+        return "fronts" if width == BY_FRONTS else "panels" if width == BY_PANELS else "band"
 
     @property
     def n_values(self) -> int:
         """Counts the numbers stored."""
         n, width = self.size
-        return int(self.fronts.panel[-1]) if self.by_fronts else int(n * (width + 1))
+        stored = {
+            "fronts": self.fronts.panel[-1],
+            "panels": self.panels.first[-1],
+            "band": n * (width + 1),
+        }
+        return int(stored[self.storage])
 
     @property
     def n_dofs(self) -> int:
@@ -40,46 +67,47 @@ class Pattern(NamedTuple):
 
     def describe(self) -> str:
         """Describes the storage in words."""
-        if self.by_fronts:
-            kind = f"{len(self.fronts.update)} fronts of a nested dissection"
-        else:
-            kind = f"a band of half width {self.size[1]}"
-        return f"{self.n_dofs} dofs, {kind}, {self.n_values} numbers"
+        kinds = {
+            "fronts": f"{len(self.fronts.update)} fronts of a nested dissection",
+            "panels": f"{len(self.panels.first) - 1} panels of four columns",
+            "band": f"a band of half width {self.size[1]}",
+        }
+        return f"{self.n_dofs} dofs, {kinds[self.storage]}, {self.n_values} numbers"
 
 
 class Matrix(NamedTuple):
     """A symmetric matrix, or its Cholesky factor."""
 
     values: Floats  # (n_values,) lower half; of a band column by column
-    scratch: Floats  # of the factorisation
+    scratch: Floats  # of the factorisation by fronts, or of the solution by panels
     pattern: Pattern  # of the entries
 
 
 def number_free_dofs(
-    site: Floats, pairs: Ints, held: Ints, by_fronts: bool | None = None
+    site: Floats, pairs: Ints, held: Ints, storages: tuple[Storage, ...] = OF_EQUILIBRIA
 ) -> tuple[Ints, Pattern]:
     """Numbers the dofs that are not held, in the order in which the tangent is solved fastest.
 
     `site` (n_units, 2) is where the units are, three dofs each; `pairs` (n, 2) are coupled; `held`
-    are ids of the prescribed dofs; `by_fronts` tells how to store the tangent, by default whichever
-    should be faster.
+    are ids of the prescribed dofs; `storages` are those to choose from.
 
     Returns:
         (3 n_units,) position of each dof among the free ones, -1 where held; and the pattern.
     """
-    if by_fronts is not None:
-        return (_in_fronts if by_fronts else _in_a_band)(site, pairs, held)
-    banded = _in_a_band(site, pairs, held)
-    if seconds(banded[1]) < len(site) * FRONT_CALL / 10:  # no order could gain much
-        return banded
-    return min(banded, _in_fronts(site, pairs, held), key=lambda made: seconds(made[1]))
+    first, *others = storages
+    made = [_NUMBER[first](site, pairs, held)]
+    if seconds(made[0][1]) >= len(site) * FRONT_CALL / 10:  # or no order could gain much
+        made += [_NUMBER[storage](site, pairs, held) for storage in others]
+    return min(made, key=lambda numbered: seconds(numbered[1]))
 
 
 def seconds(pattern: Pattern) -> float:
     """Predicts the time of one core to factorise a matrix of that pattern, s."""
-    if not pattern.by_fronts:
+    if pattern.storage == "band":
         n, width = (float(number) for number in pattern.size)
         return (NARROW_FLOP if width < band.NARROW else BAND_FLOP) * n * width**2
+    if pattern.storage == "panels":
+        return float(PANEL_FLOP * (np.diff(pattern.panels.first).astype(float) ** 2 / 4).sum())
     own, edge = (
         np.diff(ends).astype(float) for ends in (pattern.fronts.first, pattern.fronts.edge)
     )
@@ -89,7 +117,16 @@ def seconds(pattern: Pattern) -> float:
 
 def _in_a_band(site: Floats, pairs: Ints, held: Ints) -> tuple[Ints, Pattern]:
     free, width = band.number_free_dofs(len(site), pairs, held)
-    return free, Pattern(np.array([free.max(initial=-1) + 1, width]), no_fronts())
+    return free, Pattern(np.array([free.max(initial=-1) + 1, width]), no_fronts(), no_panels())
+
+
+def _in_panels(site: Floats, pairs: Ints, held: Ints) -> tuple[Ints, Pattern]:
+    orders = (np.arange(len(site)), band.cuthill_mckee(len(site), pairs))
+    numbered = [band.number_in_order(order, held) for order in orders]
+    made = [(free, panels_of(reach_of(free.reshape(-1, 3), pairs))) for free in numbered]
+    size = np.array([numbered[0].max(initial=-1) + 1, BY_PANELS])
+    patterns = [(free, Pattern(size, no_fronts(), panels)) for free, panels in made]
+    return min(patterns, key=lambda numbered: seconds(numbered[1]))
 
 
 def _in_fronts(site: Floats, pairs: Ints, held: Ints) -> tuple[Ints, Pattern]:
@@ -102,51 +139,93 @@ def _in_fronts(site: Floats, pairs: Ints, held: Ints) -> tuple[Ints, Pattern]:
     free = np.full(3 * len(site), -1, dtype=np.int64)
     free[dofs] = np.arange(len(dofs))
     fronts = fronts_of(own, boundaries, n_dofs[order])
-    return free, Pattern(np.array([len(dofs), -1]), fronts)
+    return free, Pattern(np.array([len(dofs), BY_FRONTS]), fronts, no_panels())
+
+
+_NUMBER = {"band": _in_a_band, "panels": _in_panels, "fronts": _in_fronts}
 
 
 def matrix(pattern: Pattern) -> Matrix:
     """Allocates a matrix of that pattern, not yet cleared."""
-    n, width = pattern.size
-    n_values = pattern.fronts.panel[-1] if width < 0 else n * (width + 1)
-    return Matrix(np.empty(n_values), np.empty(pattern.fronts.scratch[0]), pattern)
+    n_scratch = pattern.fronts.scratch[0] + WIDTH * (len(pattern.panels.first) - 1)
+    return Matrix(np.empty(pattern.n_values), np.empty(n_scratch), pattern)
 
 
 @compiled
 def clear(of: Matrix) -> None:
     """Sets all entries to zero."""
     of.values[:] = 0.0
+    if of.pattern.size[1] == BY_PANELS:
+        fill_padding(of.values, of.pattern.size[0], of.pattern.panels.first)
+
+
+@compiled
+def entry(pattern: Pattern, i: int, j: int) -> int:
+    """Finds the entries (i, j) and (j, i), which are one, among the values; -1 if one is negative.
+
+    They must be in the pattern.
+    """
+    if i < 0 or j < 0:
+        return -1
+    row, column = max(i, j), min(i, j)
+    width = pattern.size[1]
+    if width >= 0:
+        return column * width + row
+    if width == BY_PANELS:
+        return entry_of_panels(row, column, pattern.panels.first)
+    f = pattern.fronts
+    return entry_of_fronts(row, column, f.owner, f.first, f.edge, f.boundary, f.panel)
 
 
 @compiled
 def add(of: Matrix, i: int, j: int, value: float) -> None:
     """Adds to the entries (i, j) and (j, i), which must be in the pattern; to none if negative."""
-    if i < 0 or j < 0:
-        return
-    row, column = max(i, j), min(i, j)
-    width = of.pattern.size[1]
-    if width < 0:
-        f = of.pattern.fronts
-        at = entry(row, column, f.owner, f.first, f.edge, f.boundary, f.panel)
+    at = entry(of.pattern, i, j)
+    if at >= 0:
         of.values[at] += value
-    else:
-        of.values[column * width + row] += value
+
+
+@compiled
+def block_entries(pattern: Pattern, free: Ints, pairs: Ints) -> Ints:
+    """Finds where the lower halves of blocks of six by six lie among the values, row by row.
+
+    ``free`` (3 n_units,) numbers the free dofs, negative where held; ``pairs`` (n, 2) of units are
+    coupled by a block each.
+
+    Returns:
+        (n, 21) places, -1 where a dof is held.
+    """
+    found = np.empty((len(pairs), 21), dtype=np.int64)
+    place = np.empty(6, dtype=np.int64)
+    for k in range(len(pairs)):
+        for m in range(6):
+            place[m] = free[3 * pairs[k, m // 3] + m % 3]
+        at = 0
+        for row in range(6):
+            for column in range(row + 1):
+                found[k, at] = entry(pattern, place[row], place[column])
+                at += 1
+    return found
 
 
 @compiled
 def factorise(of: Matrix) -> bool:
     """Replaces the matrix by its Cholesky factor; False if it is not positive definite."""
     n, width = of.pattern.size
-    if width < 0:
-        return factorise_fronts(of.values, of.scratch, of.pattern.fronts)
-    return band.factorise(of.values.reshape(n, width + 1))
+    if width >= 0:
+        return band.factorise(of.values.reshape(n, width + 1))
+    if width == BY_PANELS:
+        return factorise_panels(of.values, of.pattern.panels.first)
+    return factorise_fronts(of.values, of.scratch, of.pattern.fronts)
 
 
 @compiled
 def solve(factor: Matrix, right: Floats) -> None:
     """Overwrites ``right`` (n,) with the solution for a factor of ``factorise``."""
     n, width = factor.pattern.size
-    if width < 0:
-        solve_fronts(factor.values, factor.pattern.fronts, right)
-    else:
+    if width >= 0:
         band.solve(factor.values.reshape(n, width + 1), right)
+    elif width == BY_PANELS:
+        solve_panels(factor.values, factor.pattern.panels.first, right, factor.scratch)
+    else:
+        solve_fronts(factor.values, factor.pattern.fronts, right)

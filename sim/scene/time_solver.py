@@ -17,6 +17,7 @@ import scipy.sparse.linalg as spla
 
 from sim.core import Floats, SimulationError
 from sim.energy import Topology
+from sim.linalg import OF_MOTIONS
 from sim.scene.scene import DIRECTED, Accuracy, Scene
 from sim.solvers import PrescribedMotion, Pulse, breakpoints, single_motions, solve_case
 from sim.structure import ConcreteParameters
@@ -305,8 +306,9 @@ def _first_grid(
     drives = different_drives(scene)
     stops = _breakpoints(drives, end)
     solver = ImplicitSolver(
-        scene.topology, steps, times, NEWTON, threads, turn_allowance=TURN_ALLOWANCE
-    )
+        replace(scene.topology, storages=OF_MOTIONS), steps, times, NEWTON, threads,
+        turn_allowance=TURN_ALLOWANCE,
+    )  # fmt: skip
     if frequency is not None:
         return replace(solver, times=time_grid.through(steps, stops))
     sizes = [_size(scene.topology, end, values, drive, stops) for drive in drives]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, NewContactPairs
 from sim.energy import Topology, kinematics_of, locate, system_of, tangent
-from sim.linalg import clear, matrix, number_free_dofs
+from sim.linalg import clear, matrix
 from sim.structure import ConcreteParameters
 
 Complexes: TypeAlias = NDArray[np.complex128]
@@ -71,11 +71,10 @@ class WholeTangent:
     """Evaluates a structure's tangent among all dofs, held ones included, state by state."""
 
     def __init__(self, topology: Topology, values: ConcreteParameters) -> None:
-        whole = replace(topology.unloaded, held=np.zeros(0, dtype=np.int64))
-        self._place, pattern = number_free_dofs(
-            whole.site, whole.coupled_units, whole.held, by_fronts=False
-        )
-        self._system = system_of(whole, values)._replace(free=self._place, pattern=pattern)
+        none = np.zeros(0, dtype=np.int64)
+        whole = replace(topology.unloaded, held=none, storages=("band",))
+        self._place, pattern = whole.numbering
+        self._system = system_of(whole, values)
         self._matrix, self._kinematics = matrix(pattern), kinematics_of(self._system)
         self._part: _Part | None = None
 

@@ -15,7 +15,7 @@ from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
 from sim.core import Floats, Ints
 from sim.energy import Topology, topology
 from sim.energy.network_arrays import NetworkArrays
-from sim.linalg import Matrix
+from sim.linalg import Matrix, entry
 from sim.solvers import DISPLACEMENT, Solver, concrete, differentiable_motion, held_dofs
 from sim.structure import (
     ConcreteParameters,
@@ -73,7 +73,9 @@ def some_ligaments(net: NetworkArrays, which: Ints) -> NetworkArrays:
 
 
 def dense(of: Matrix) -> Floats:
-    if not of.pattern.by_fronts:
+    if of.pattern.storage == "panels":
+        rows, columns, entries = _entries_of_panels(of)
+    elif of.pattern.storage == "band":
         n, width = of.pattern.size
         lower = of.values.reshape(n, width + 1)
         columns, below = np.nonzero(lower)
@@ -83,6 +85,16 @@ def dense(of: Matrix) -> Floats:
     full = np.zeros((of.pattern.size[0],) * 2)
     full[rows, columns] = full[columns, rows] = entries
     return full
+
+
+def _entries_of_panels(of: Matrix) -> tuple[Ints, Ints, Floats]:
+    n, first = of.pattern.n_dofs, of.pattern.panels.first
+    rows, columns = np.tril_indices(n)
+    panel = columns // 4
+    within = rows - 4 * panel < np.diff(first)[panel] // 4
+    rows, columns = rows[within], columns[within]
+    at = [entry(of.pattern, *pair) for pair in zip(rows.tolist(), columns.tolist(), strict=True)]
+    return rows, columns, of.values[at]
 
 
 def _entries_of_fronts(of: Matrix) -> tuple[Ints, Ints, Floats]:

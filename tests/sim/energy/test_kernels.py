@@ -21,7 +21,7 @@ from sim.energy import (
     void_contact_kernels,
 )
 from sim.energy.network_arrays import Kinematics, NetworkArrays
-from sim.linalg import clear, matrix, number_free_dofs
+from sim.linalg import Storage, block_entries, clear, matrix, number_free_dofs
 from sim.structure import Lattice, quads, shape
 from tests.sim.structures import assert_equal, dense, mixed_polygons
 
@@ -151,14 +151,15 @@ def test_energy_and_gradient(random_case: Case) -> None:
     assert_equal(force, np.asarray(gradient_of_definition(motion, numbers(net), net.unit)))
 
 
-@pytest.mark.parametrize("by_fronts", [False, True], ids=["band", "fronts"])
-def test_tangent(random_case: Case, by_fronts: bool) -> None:
+@pytest.mark.parametrize("storage", ["band", "panels", "fronts"])
+def test_tangent(random_case: Case, storage: Storage) -> None:
     net, motion, lattice = random_case.net, random_case.motion, random_case.lattice
     held = np.array([0, 1, 2, 7])
-    free, pattern = number_free_dofs(lattice.site, net.unit, held, by_fronts)
+    free, pattern = number_free_dofs(lattice.site, net.unit, held, (storage,))
     made = matrix(pattern)
     clear(made)
-    ligament_kernels.tangent(motion, net, located(motion, net), free, made)
+    entries = block_entries(pattern, free, net.unit)
+    ligament_kernels.tangent(motion, net, located(motion, net), entries, made.values)
     void_contact_kernels.add_tangent(motion, net, free, made)
     order = np.argsort(free)[len(held) :]
     wanted = np.asarray(hessian_of_definition(motion, numbers(net), net.unit))

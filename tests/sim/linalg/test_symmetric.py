@@ -1,13 +1,25 @@
-"""Both ways to store the tangent solve the same systems and notice what is not positive."""
+"""All ways to store the tangent solve the same systems and notice what is not positive."""
 
 import numpy as np
 import pytest
 
 from sim.core import Floats, Ints
-from sim.linalg import Matrix, add, banded, clear, factorise, matrix, number_free_dofs, solve
+from sim.linalg import (
+    OF_EQUILIBRIA,
+    Matrix,
+    Storage,
+    add,
+    banded,
+    clear,
+    factorise,
+    matrix,
+    number_free_dofs,
+    solve,
+)
 from sim.linalg.symmetric import seconds
 from tests.sim.structures import dense, mixed_polygons, rotating_squares
 
+STORAGES: tuple[Storage, ...] = ("band", "panels", "fronts")
 HELD = np.array([0, 1, 2, 9, 13])
 
 
@@ -26,10 +38,10 @@ def networks() -> dict[str, tuple[Floats, Ints]]:
     }
 
 
-def filled(name: str, by_fronts: bool, diagonal: float = 30.0) -> Matrix:
+def filled(name: str, storage: Storage, diagonal: float = 30.0) -> Matrix:
     """A random symmetric matrix on a network's pattern."""
     site, pairs = networks()[name]
-    free, pattern = number_free_dofs(site, pairs, HELD, by_fronts)
+    free, pattern = number_free_dofs(site, pairs, HELD, (storage,))
     made, rng = matrix(pattern), np.random.default_rng(0)
     clear(made)
     for a, b in pairs:
@@ -41,10 +53,10 @@ def filled(name: str, by_fronts: bool, diagonal: float = 30.0) -> Matrix:
     return made
 
 
-@pytest.mark.parametrize("by_fronts", [False, True], ids=["band", "fronts"])
+@pytest.mark.parametrize("storage", STORAGES)
 @pytest.mark.parametrize("name", list(networks()))
-def test_solution(name: str, by_fronts: bool) -> None:
-    made = filled(name, by_fronts)
+def test_solution(name: str, storage: Storage) -> None:
+    made = filled(name, storage)
     full, right = dense(made), np.random.default_rng(1).normal(size=made.pattern.n_dofs)
     solution = right.copy()
     assert factorise(made)
@@ -52,29 +64,29 @@ def test_solution(name: str, by_fronts: bool) -> None:
     np.testing.assert_allclose(full @ solution, right, atol=1e-12)
 
 
-@pytest.mark.parametrize("by_fronts", [False, True], ids=["band", "fronts"])
-def test_an_indefinite_matrix_is_noticed(by_fronts: bool) -> None:
-    made = filled("squares", by_fronts, diagonal=4.0)
+@pytest.mark.parametrize("storage", STORAGES)
+def test_an_indefinite_matrix_is_noticed(storage: Storage) -> None:
+    made = filled("squares", storage, diagonal=4.0)
     assert np.linalg.eigvalsh(dense(made)).min() < 0
     assert not factorise(made)
 
 
 @pytest.mark.parametrize("place", [0, 100, -1])
-@pytest.mark.parametrize("by_fronts", [False, True], ids=["band", "fronts"])
-def test_nan_is_not_positive_definite(by_fronts: bool, place: int) -> None:
-    made = filled("squares", by_fronts)
+@pytest.mark.parametrize("storage", STORAGES)
+def test_nan_is_not_positive_definite(storage: Storage, place: int) -> None:
+    made = filled("squares", storage)
     n = made.pattern.n_dofs
     add(made, place % n, place % n, np.nan)
     assert not factorise(made)
 
 
-@pytest.mark.parametrize("by_fronts", [False, True], ids=["band", "fronts"])
-def test_every_dof_is_numbered_once(by_fronts: bool) -> None:
+@pytest.mark.parametrize("storage", STORAGES)
+def test_every_dof_is_numbered_once(storage: Storage) -> None:
     for site, pairs in networks().values():
-        free, pattern = number_free_dofs(site, pairs, HELD, by_fronts)
+        free, pattern = number_free_dofs(site, pairs, HELD, (storage,))
         assert (free[HELD] == -1).all()
         np.testing.assert_array_equal(np.sort(free[free >= 0]), np.arange(pattern.n_dofs))
-        if not by_fronts:
+        if storage == "band":
             places = np.where(free < 0, np.nan, free).reshape(-1, 3)[pairs].reshape(len(pairs), 6)
             apart = np.nanmax(places, axis=1) - np.nanmin(places, axis=1)
             assert apart.max() <= pattern.size[1]
@@ -85,13 +97,13 @@ def test_fronts_are_chosen_where_they_are_faster() -> None:
     for side in (6, 40):
         lattice = rotating_squares(side)
         options = [
-            number_free_dofs(lattice.site, lattice.ligament_units, HELD, by_fronts)[1]
-            for by_fronts in (False, True)
+            number_free_dofs(lattice.site, lattice.ligament_units, HELD, (storage,))[1]
+            for storage in OF_EQUILIBRIA
         ]
         chosen = number_free_dofs(lattice.site, lattice.ligament_units, HELD)[1]
         assert seconds(chosen) == min(map(seconds, options))
-        kinds.append(chosen.by_fronts)
-    assert kinds == [False, True]
+        kinds.append(chosen.storage)
+    assert kinds == ["band", "fronts"]
 
 
 def test_a_long_strip_is_numbered_along_its_short_side() -> None:

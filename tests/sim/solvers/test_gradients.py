@@ -230,7 +230,7 @@ def test_gradients_without_contact(posed: Posed, solver: str, quantity: str) -> 
 def test_equilibria_by_fronts() -> None:
     """30 x 30 squares, whose tangent is no longer stored as a band."""
     rig = structures.squeezed(20.0, side=30)
-    assert rig.topology.numbering[1].by_fronts
+    assert rig.topology.numbering[1].storage == "fronts"
     assert_exact(Ray(rig, SOLVERS["static"], "design"))
 
 
