@@ -36,7 +36,8 @@ def factors(name: str, skipped: float, _: Task) -> Run:
     if skipped:
         return _default(name, integrator="implicit")
     with _no_cache():
-        time_integration.esdirk_stage.REFACTOR_ABOVE = 0.0
+        stage = time_integration.esdirk_stage
+        stage.PATIENCE, stage.KEEP_BELOW = 0, 0.0
         quasistatics.newton.KEEP_FACTOR = quasistatics.newton.RENEW_FACTOR = 0.0
         return _default(name, integrator="implicit")
 

@@ -103,6 +103,7 @@ def adjoint(
                 d = system.dofs[i]
                 # (M / k^2 + C / k + K) lambda = du + dv / k + da / k^2
                 work.right[i] = u[s, d] + (v[s, d] + a[s, d] / k) / k
+            locate(stage_u[n, s], system, work.kinematics)
             if not factorise_stage(stage_u[n, s], system, work, k):
                 return False
             solve(work.matrix, work.right)

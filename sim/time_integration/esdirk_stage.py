@@ -5,7 +5,7 @@ Equation: M q'' = -dE/dq - C q' on the free dofs, the held ones prescribed. A st
     M (u - u* - k v*) / k^2 + C (u - u*) / k + dE/du = 0,   k = gamma h,
 
 for its displacement u; then v = (u - u*) / k and a = (v - v*) / k. The factor is kept while it
-contracts.
+contracts fast.
 """
 
 from typing import NamedTuple
@@ -17,14 +17,16 @@ from sim.energy import (
     admissible_step,
     gradient,
     hessian_product,
-    locate,
     tangent,
 )
 from sim.linalg import add, clear, factorise, solve
 
 MAX_ITERATIONS = 30
-MAX_FACTORS = 12
-REFACTOR_ABOVE = 0.3
+MAX_FACTORS = 20
+PATIENCE = 6
+"""Iterations that take as long as a factor and the two or three after it."""
+KEEP_BELOW = 0.1
+"""Rate of a stage up to which its factor is kept for the next."""
 NEW_RATE = 0.3
 """At which a new factor is presumed to contract at most, until it is seen."""
 KEEP_FROM_BARRIER = 0.9
@@ -45,9 +47,11 @@ class Base(NamedTuple):
 
 @compiled
 def factorise_stage(motion: Floats, system: System, work: Workspace, k: float) -> bool:
-    """Factor of a stage's tangent M/k^2 + C/k + K in the workspace; False if not positive."""
+    """Factor of a stage's tangent M/k^2 + C/k + K in the workspace; False if not positive.
+
+    The workspace has the kinematics of ``motion``.
+    """
     clear(work.matrix)
-    locate(motion, system, work.kinematics)
     tangent(motion, system, work.kinematics, work.matrix)
     for i in range(len(system.dofs)):
         d = system.dofs[i]
@@ -61,10 +65,11 @@ def _newton_step(
 ) -> tuple[float, float]:
     """Fills ``work.step``: the held dofs to ``target``, the free ones by Newton's method.
 
+    The workspace has the force at ``motion``, its kinematics and a factor.
+
     Returns:
         the largest move of a held dof and the (scaled) largest of a free one.
     """
-    gradient(motion, system, work.kinematics, work.force)
     gap = 0.0
     work.step[:] = 0.0
     for i in range(len(system.held)):
@@ -108,7 +113,9 @@ def solve_stage(
         the status, whether the factor in the workspace is still good, and the contraction rate.
     """
     previous, factors = 0.0, 0
-    for iteration in range(MAX_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
+        gradient(motion, system, work.kinematics, work.force)
+        counts[0] += 1
         if not fresh:
             factors += 1
             counts[1] += 1
@@ -118,7 +125,6 @@ def solve_stage(
                 return INDEFINITE, False, 1.0
             fresh, previous, rate = True, 0.0, min(rate, NEW_RATE)
         gap, size = _newton_step(motion, target, base, system, work)
-        counts[0] += 1
         counts[2] += 1
         allowed = KEEP_FROM_BARRIER * admissible_step(motion, system, work.step)
         motion += min(1.0, allowed) * work.step
@@ -132,9 +138,8 @@ def solve_stage(
         likely = min(rate, 0.9)
         settled = likely / (1.0 - likely) * size <= tolerance or size <= 1e-13
         if gap == 0.0 and settled:
-            return CONVERGED, rate < REFACTOR_ABOVE, rate
-        too_slow = rate ** (MAX_ITERATIONS - iteration) * size > tolerance
-        if previous > 0.0 and (rate > REFACTOR_ABOVE or too_slow):
+            return CONVERGED, rate < KEEP_BELOW, rate
+        if previous > 0.0 and rate**PATIENCE * size > tolerance:
             fresh = False
         previous = size
     return STALLED, False, rate
