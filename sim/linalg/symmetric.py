@@ -23,7 +23,7 @@ from sim.linalg.panels import (
 )
 from sim.linalg.row_products import WIDTH
 
-NARROW_FLOP, BAND_FLOP, FRONT_FLOP, FRONT_CALL, PANEL_FLOP = 72e-12, 42e-12, 58e-12, 2e-6, 72e-12
+NARROW_FLOP, BAND_FLOP, FRONT_FLOP, FRONT_CALL, PANEL_FLOP = 72e-12, 42e-12, 58e-12, 2e-6, 47e-12
 """Seconds of one core for a multiplication of each method, and for a front's calls."""
 
 Storage = Literal["band", "panels", "fronts"]

@@ -6,10 +6,12 @@ import pytest
 from sim.core import Floats, Ints
 from sim.linalg import (
     OF_EQUILIBRIA,
+    OF_MOTIONS,
     Matrix,
     Storage,
     add,
     banded,
+    block_entries,
     clear,
     factorise,
     matrix,
@@ -92,18 +94,53 @@ def test_every_dof_is_numbered_once(storage: Storage) -> None:
             assert apart.max() <= pattern.size[1]
 
 
-def test_fronts_are_chosen_where_they_are_faster() -> None:
+@pytest.mark.parametrize(
+    ("storages", "wanted"),
+    [(OF_EQUILIBRIA, ["band", "fronts"]), (OF_MOTIONS, ["panels", "fronts"])],
+    ids=["equilibria", "motions"],
+)
+def test_fronts_are_chosen_where_they_are_faster(
+    storages: tuple[Storage, ...], wanted: list[Storage]
+) -> None:
     kinds = []
-    for side in (6, 40):
+    for side in (6, 60):
         lattice = rotating_squares(side)
         options = [
             number_free_dofs(lattice.site, lattice.ligament_units, HELD, (storage,))[1]
-            for storage in OF_EQUILIBRIA
+            for storage in storages
         ]
-        chosen = number_free_dofs(lattice.site, lattice.ligament_units, HELD)[1]
+        chosen = number_free_dofs(lattice.site, lattice.ligament_units, HELD, storages)[1]
         assert seconds(chosen) == min(map(seconds, options))
         kinds.append(chosen.storage)
-    assert kinds == ["band", "fronts"]
+    assert kinds == wanted
+
+
+def test_panels_along_diagonals_are_shorter_than_a_band_of_rows() -> None:
+    lattice = rotating_squares(15)
+    band, panels = (
+        number_free_dofs(lattice.site, lattice.ligament_units, HELD, (storage,))[1]
+        for storage in ("band", "panels")
+    )
+    assert panels.n_values < 0.8 * band.n_values
+    assert seconds(panels) < 0.6 * seconds(band)
+
+
+def test_blocks_are_added_where_their_entries_lie() -> None:
+    """Whatever the storage, the places of a block are those that `add` finds one by one."""
+    lattice = rotating_squares(4)
+    for storage in STORAGES:
+        free, pattern = number_free_dofs(lattice.site, lattice.ligament_units, HELD, (storage,))
+        one_by_one, at_once = matrix(pattern), matrix(pattern)
+        clear(one_by_one)
+        clear(at_once)
+        places = block_entries(pattern, free, lattice.ligament_units)
+        for k, (a, b) in enumerate(lattice.ligament_units):
+            dofs = np.concatenate([3 * a + np.arange(3), 3 * b + np.arange(3)])
+            for m, (row, column) in enumerate(zip(*np.tril_indices(6), strict=True)):
+                add(one_by_one, free[dofs[row]], free[dofs[column]], 100.0 * k + m)
+                if places[k, m] >= 0:
+                    at_once.values[places[k, m]] += 100.0 * k + m
+        np.testing.assert_array_equal(at_once.values, one_by_one.values)
 
 
 def test_a_long_strip_is_numbered_along_its_short_side() -> None:

@@ -100,6 +100,8 @@ def test_stages_are_solved_as_a_motion_needs_it_where_no_gradient_does(
     motions, gradients = [], []
     for gradient in (True, False):
         plan = sim.make_plan(scene, still, gradient=gradient)
+        assert isinstance(plan.solver, ImplicitSolver)
+        assert plan.solver.topology.numbering[1].storage == "panels"
         found = sim.simulate(scene, vertices=still, plan=plan)
         motions.append(found.displacement[..., scene.objective.region, :] / scales(15.0))
         gradients.append(found.records[0].counts[0])
