@@ -14,7 +14,7 @@ ENTRIES = 8.0
 """Of a factor, over n log2(n) unknowns: 7.0 of 120 thousand (`make bench`)."""
 SECONDS, SECONDS_EACH = 6e-9, 2e-7
 """To factorise a tangent of n unknowns, over n^1.5; and of all loops, over n."""
-FACTORISATIONS, IN_TIME = 4, 8
+FACTORISATIONS, IN_TIME = 4, 6
 """For each load, and for each implicit step with its adjoint."""
 SECONDS_EXPLICIT = 7e-7
 """Of an explicit step with its adjoint, over n (fig7: 6.5e-7, a draft of it: 8e-7)."""

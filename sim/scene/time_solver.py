@@ -50,7 +50,7 @@ STAGE_SHARE = 0.1
 accuracy allows a motion: it makes a hundredth of that error, and takes half as many iterations."""
 IMPLICIT_ORDER, EXPLICIT_ORDER = 0.6, 3.0
 MOST_PARTS = 8
-EXPLICIT_STEPS = 6
+EXPLICIT_STEPS = 4
 """Explicit steps that take the time of one implicit step, the adjoint of either counted in."""
 MOST_DOUBLINGS = 4
 MOST_MEMORY = 1 << 29

@@ -198,7 +198,7 @@ def drive_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
     if response.held and "intact" in structures(study.response) and path.static:
         off = over_cases(problem, measures.reaction_error(values)).sel(structure="cloaked")
         axes.text(
-            0.97, 0.05, f"cloaked off by {float(off):.1%}", color=style.CLOAKED,
+            0.97, 0.05, f"cloaked off\nby {100 * float(off):.1f} %", color=style.CLOAKED,
             transform=axes.transAxes, ha="right", fontsize=style.SMALL,
         )  # fmt: skip
     if path.static:
