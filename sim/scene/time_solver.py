@@ -50,8 +50,9 @@ STAGE_SHARE = 0.1
 accuracy allows a motion: it makes a hundredth of that error, and takes half as many iterations."""
 IMPLICIT_ORDER, EXPLICIT_ORDER = 0.6, 3.0
 MOST_PARTS = 8
-EXPLICIT_STEPS = 4
-"""Explicit steps that take the time of one implicit step, the adjoint of either counted in."""
+EXPLICIT_STEPS = 6
+"""Explicit steps that an implicit one must save to be taken: it takes the time of four, the adjoint
+of either counted in, and they resolve the front of a jump as well."""
 MOST_DOUBLINGS = 4
 MOST_MEMORY = 1 << 29
 """Bytes that the stages of an implicit run may take."""
