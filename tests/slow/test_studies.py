@@ -41,8 +41,9 @@ class Expected:
         losses = built.response["loss"].mean("case")
         reached = float(losses.sel(structure="cloaked"))
         assert reached <= most * (1 + TOLERANCE)
-        same_steps = self.shorter is None
-        assert reached == pytest.approx(built.best_loss, rel=1e-6 if same_steps else 1e-4)
+        # a motion's steps are as short as each structure needs them: a design's, and then its own
+        in_time = bool(np.abs(built.response["velocity"]).max() > 0.0)
+        assert reached == pytest.approx(built.best_loss, rel=1e-4 if in_time else 1e-6)
         assert float(built.design["constraint_margin"].min()) >= 0.0
         assert int(built.design["overlaps"]) == 0
         path = built.response.sel(structure="cloaked")
