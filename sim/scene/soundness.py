@@ -158,10 +158,11 @@ def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iter
         course = np.where(drive.control == DISPLACEMENT, course, 0.0)
     far = float(np.hypot(course[..., 0], course[..., 1]).max(initial=0.0))
     size = np.ptp(scene.lattice.vertices, axis=0)
-    if not far <= size.max():
+    turned_over = bool(np.abs(course[..., 2]).max(initial=0.0) > np.pi / 2)
+    if not far <= (1 + turned_over) * size.max():  # a strip's end, folded back, goes twice as far
         raise SceneError(
-            f"{case} moves its units by {far:.4g} mm, further than the lattice is long"
-            f" ({size[0]:.4g} by {size[1]:.4g} mm); lower the amplitude",
+            f"{case} moves its units by {far:.4g} mm, further than {'twice ' * turned_over}the"
+            f" lattice is long ({size[0]:.4g} by {size[1]:.4g} mm); lower the amplitude",
             "drive.amplitude",
         )
     if scene.loads.static:

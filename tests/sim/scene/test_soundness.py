@@ -83,6 +83,19 @@ def test_sound_scenes_pass() -> None:
     assert [check_scene(each) for each in sound] == [()] * len(sound)
 
 
+def test_the_end_of_a_strip_may_be_folded_back() -> None:
+    """Beyond the other end, if it is turned: but not by more than twice the strip's length."""
+    for far, turned, sound in ((1.3, 3.0, True), (1.3, 0.1, False), (2.1, 3.0, False)):
+        end = sim.TimeSeries(
+            np.array([0.0, 1.0]), np.array([[0.0] * 3, [-75.0 * far, 0.0, turned]])
+        )
+        if sound:
+            check_scene(scene(end))
+        else:
+            with pytest.raises(SceneError, match="the lattice is long"):
+                check_scene(scene(end))
+
+
 def test_units_that_cross_themselves_are_refused() -> None:
     for vertices in (crossed(7), rotating_squares().vertices * [-1.0, 1.0]):
         with pytest.raises(SceneError, match=r"unit \d+ at .* edges that cross or corners"):
