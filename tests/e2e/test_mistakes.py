@@ -1,5 +1,6 @@
 """Mistakes and refusals meet the real stages: one message, an exit code, and nothing lost."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -24,14 +25,14 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (16 << 10, 16 << 10))
 """
 
 
-def test_a_bad_problem_leaves_results_alone(undisturbed: Checkout) -> None:
-    before, text = undisturbed.built(), undisturbed.problem.read_text()
-    undisturbed.edit("columns: 5", "columns: five")
-    ended = undisturbed.make()
-    undisturbed.problem.write_text(text)
+def test_a_bad_problem_leaves_results_alone(fresh: Checkout, undisturbed: Checkout) -> None:
+    shutil.copytree(undisturbed.results, fresh.results)
+    before = fresh.built()
+    assert before
+    fresh.edit("columns: 5", "columns: five")
     place = f"experiments/{STUDY}/problem.yaml, line"
-    assert_one_message(ended, place, "lattice.columns", "value:")
-    assert undisturbed.built() == before
+    assert_one_message(fresh.make(), place, "lattice.columns", "value:")
+    assert fresh.built() == before
 
 
 def test_a_truncated_or_foreign_design(
