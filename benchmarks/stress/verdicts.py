@@ -23,7 +23,9 @@ Wanted = Literal["solution", "either", "refusal"]
 
 STATED_OVER_TRUE = "stated error over the true one"
 """Names the check whose median and 95 % are told of a family."""
-REMEDIES = ("; try ", "; ask for ", "; loosen ", "; hold ", "or mend ", "; make ")
+REMEDIES = (
+    "; try ", "; ask for ", "; loosen ", "; hold ", "or mend ", "; make ", "; clamp ", "; lower ",
+)  # fmt: skip
 """How the messages of actionable refusals begin to say what to do."""
 
 
