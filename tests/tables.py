@@ -1,6 +1,6 @@
 """Tables of inputs and of what is told of them, kept as data; and the check of what is told."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -32,6 +32,18 @@ def cases(room: str, names: str, *more: object) -> Callable[[Test], Test]:
         return made
 
     return decorated
+
+
+def some(rows: Iterable[Any], count: int = 2) -> list[Any]:
+    """Lists rows for a test, all but the first ``count`` of them for `make test-slow`."""
+    first, rest = [*rows][:count], [*rows][count:]
+    later = [
+        pytest.param(*row, marks=pytest.mark.slow)
+        if isinstance(row, tuple)
+        else pytest.param(row, marks=pytest.mark.slow)
+        for row in rest
+    ]
+    return [*first, *later]
 
 
 @contextmanager

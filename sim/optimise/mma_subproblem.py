@@ -73,7 +73,8 @@ class Separable:
     def _summed(self, entries: Floats, multipliers: Floats) -> Floats:
         """Sums the columns (n,) of entries (n_entries,) times their functions' multipliers."""
         weighted = entries * multipliers[self._rows]
-        return np.bincount(self.up.indices, weighted, minlength=len(self.centre))
+        summed = np.bincount(self.up.indices, weighted, minlength=len(self.centre))
+        return np.asarray(summed, dtype=float)
 
     @cached_property
     def _rows(self) -> Ints:

@@ -88,6 +88,7 @@ def plate(request: pytest.FixtureRequest) -> StressScene:
     return pressed(squares(3), 0.15, contact=request.param)
 
 
+@pytest.mark.slow
 def test_the_definition_has_the_derivatives_of_its_energy(plate: StressScene) -> None:
     state = checks.solved(plate, StaticSolver(plate.topology, np.ones(1))).displacement[-1]
     direction = np.random.default_rng(0).normal(size=len(state)) * 1e-5

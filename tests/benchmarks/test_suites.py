@@ -16,13 +16,16 @@ from sim.core import Floats
 from sim.energy import gradient, kinematics_of, system_of
 from sim.scene import concrete_parameters, parameters_of_design
 from sim.solvers import Harmonic
+from tests.tables import some
 
 COMPILED = ("compilation", "fresh factors")
 """Those that compile every loop anew, minutes each: tests/slow/test_benchmarks.py tries them."""
 
 
 @pytest.mark.parametrize(
-    "skip", [skip for skip in suites.SKIPS if skip.name not in COMPILED], ids=lambda skip: skip.name
+    "skip",
+    some([skip for skip in suites.SKIPS if skip.name not in COMPILED]),
+    ids=lambda skip: skip.name,
 )
 def test_a_skip_changes_nothing_beyond_its_tolerance(skip: suites.Skip) -> None:
     name = "small_wave" if skip.wave else "small_push"
@@ -38,7 +41,7 @@ def refuse_change(
     assert max(changes.values()) <= skip.tolerance
 
 
-@pytest.mark.parametrize("optimiser", suites.OPTIMISERS)
+@pytest.mark.parametrize("optimiser", some(suites.OPTIMISERS))
 def test_an_optimiser_lowers_the_loss(optimiser: str) -> None:
     course = suites.prepare(
         "small_push", suites.OptimiserBudget(evaluations=30), optimiser
@@ -68,6 +71,7 @@ def test_counts_of_variables_and_the_direction_of_one_case() -> None:
     assert float(motion.direction) == pytest.approx(np.deg2rad(135.0))
 
 
+@pytest.mark.slow
 def test_the_baseline_has_the_same_forces() -> None:
     scene = paper_scenes.fig2()
     values = concrete_parameters(scene, scene.lattice.vertices)

@@ -37,8 +37,17 @@ def test_tests_that_pages_name_are_there(page: str) -> None:
 FOLDER = ROOT / "docs/examples"
 PINNED: dict[str, dict[str, float]] = tables("docs")["examples"]
 NAMES = sorted(p.stem for p in FOLDER.glob("*.py") if p.stem not in ("render", "specimen"))
-SLOW = ("hidden_void", "resumed_run", "robust_design", "shielding_cloak", "track_video")
-"""Examples that take eight seconds and more."""
+SLOW = (
+    "band_diagram",
+    "error_estimate",
+    "hidden_void",
+    "resumed_run",
+    "robust_design",
+    "shielding_cloak",
+    "static_cloak",
+    "track_video",
+)
+"""Examples that take four seconds and more."""
 
 
 @pytest.mark.parametrize(

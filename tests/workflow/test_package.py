@@ -76,6 +76,7 @@ def test_modules_have_one_identity(wheel: Path, tmp_path: Path) -> None:
     ran(ROOT, tmp_path, "-c", IN_A_CHECKOUT)
 
 
+@pytest.mark.slow
 def test_a_study_is_made_and_planned_in_an_empty_folder(wheel: Path, tmp_path: Path) -> None:
     command = ("-m", "metacloak")
     assert "usage: metacloak STAGE" in ran(wheel, tmp_path, *command, "--help")

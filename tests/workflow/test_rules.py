@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.workflow.rule_inputs import check_room, products
+from tests.tables import some
 from tests.workflow.conftest import Sandbox
 
 STUDY = {"design": 2, "select": 1, "simulate": 1, "as_built": 1, "sweep": 4, "sweep_gather": 1}
@@ -119,7 +120,7 @@ def test_faulty_problem_is_one_message_even_if_results_exist(built: Sandbox) -> 
         assert "Traceback" not in ended.stderr
 
 
-@pytest.mark.parametrize("name", ["my-cloak", "a; touch pwned", "$(touch pwned)"])
+@pytest.mark.parametrize("name", some(["$(touch pwned)", "a; touch pwned", "my-cloak"], 1))
 def test_names_that_targets_cannot_have_are_refused(sandbox: Sandbox, name: str) -> None:
     experiments = sandbox.root / "experiments"
     shutil.copytree(experiments / "fig2", experiments / name)

@@ -68,6 +68,7 @@ def set_up(folder: Path, *lock: str, offline: bool = True) -> subprocess.Complet
     )
 
 
+@pytest.mark.slow
 def test_a_folder_of_packages_is_enough(folder: Path) -> None:
     line = wheel(folder / "wheels", "nothing", {"nothing.py": "value = 1\n"})
     ended = set_up(folder, line)

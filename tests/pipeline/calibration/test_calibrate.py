@@ -84,6 +84,7 @@ def test_a_problem_file_takes_the_fragment(made: Path) -> None:
     assert material.damping_coefficients(15.0) == pytest.approx(found["value"].values[4:], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_the_same_files_give_the_same_bytes(made: Path, tmp_path: Path) -> None:
     again = ["--out", str(tmp_path / "found.nc"), "--quiet"]
     assert run_stage("calibrate", [str(made / "data/calibration.yaml"), *again]) == 0

@@ -41,6 +41,7 @@ def assert_inside(found: xr.Dataset, true: dict[str, float]) -> None:
         assert one["lower"] < value < one["upper"], name
 
 
+@pytest.mark.slow
 def test_the_zero_of_a_load_cell_is_found(tmp_path: Path) -> None:
     sets = [each | {"tare": True} for each in specimens.force_sets()[1:]]
     path = specimens.synthesised(tmp_path, specimens.described(sets, WANTED, material=START))

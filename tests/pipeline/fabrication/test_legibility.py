@@ -18,6 +18,7 @@ from pipeline.fabrication.readback import MeshBody
 from pipeline.problem.sections import Fabrication, Labels
 from tests.pipeline.fabrication import slender
 from tests.pipeline.fabrication.stroke_reader import read
+from tests.tables import some
 
 ARROW = (np.array([[5.0, 0.0], [5.5, 1.0], [6.0, 0.0]]),)
 ids = st.builds(
@@ -83,7 +84,7 @@ def test_the_least_cut_place_is_taken() -> None:
     assert 0.7 < placed.kept < 1.0
 
 
-@pytest.mark.parametrize("name", slender.UNITS)
+@pytest.mark.parametrize("name", some(slender.UNITS, 6))
 def test_the_id_of_a_slender_unit_is_read_on_both_sides(name: str) -> None:
     """And the printed unit is sunk along what is read from below, but for its rim."""
     unit = slender.built(name)
@@ -100,7 +101,7 @@ def test_the_id_of_a_slender_unit_is_read_on_both_sides(name: str) -> None:
 SETTINGS = Fabrication()
 
 
-@pytest.mark.parametrize("name", slender.UNITS)
+@pytest.mark.parametrize("name", some(slender.UNITS, 6))
 def test_a_slender_unit_is_built_without_a_fault(name: str) -> None:
     unit, data = slender.built(name), slender.UNITS[name]
     vertices = [vertex for vertex, *_ in data["slots"]]

@@ -153,7 +153,8 @@ def designs(
     return constraints, drawn, int(np.argmax(least < 0.0)) - 1
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
 def test_a_design_with_room_for_straight_slots_has_none_that_turns(seed: int) -> None:
     """Random shifts, as large as the limits allow: the rule of slots finds straight ones."""
     settings = Fabrication()

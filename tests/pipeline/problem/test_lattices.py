@@ -93,6 +93,7 @@ def test_a_listed_lattice_is_the_one_that_was_listed(tmp_path: Path, suffix: str
     np.testing.assert_array_equal(found.ligament_units, SQUARES.ligament_units)
 
 
+@pytest.mark.slow
 def test_a_drawing_runs_as_the_lattice_that_it_shows(tmp_path: Path) -> None:
     as_dxf(tmp_path / "hand.dxf", SQUARES)
     _, drawn = run(from_file(tmp_path, "hand.dxf"))

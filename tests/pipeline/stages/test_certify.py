@@ -113,7 +113,8 @@ FROM_ABOVE = (
 )
 
 
-@pytest.mark.parametrize("setups", ["", pytest.param(FROM_ABOVE, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("setups", ["", FROM_ABOVE])
 def test_the_page_of_a_path(setups: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ranges = f"target: intact, loads: {{ directions: [170 deg, 190 deg]{setups} }}"
     more = static.HOLE.replace("target: intact", ranges)

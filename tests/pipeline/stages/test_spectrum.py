@@ -71,6 +71,7 @@ def test_what_cannot_be_analysed_is_told(design: Path, tmp_path: Path, failing: 
         assert "problem.yaml" in told
 
 
+@pytest.mark.slow
 def test_the_page_holds_the_figure_and_its_curves(analysed: Path, tmp_path: Path) -> None:
     pages = []
     for name in ("one", "two"):

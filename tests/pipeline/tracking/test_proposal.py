@@ -35,6 +35,7 @@ def test_a_mirrored_video_is_seen_as_such() -> None:
     assert "mirrored" in orientation_text(found.detection.camera)
 
 
+@pytest.mark.slow
 def test_a_proposal_leaves_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = str(tmp_path)
     words = ["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", folder]

@@ -39,6 +39,7 @@ def test_its_page_works_from_disk(folder: Path) -> None:
     assert "SYNTHETIC" in html
 
 
+@pytest.mark.slow
 def test_it_is_the_same_again(filmed: StudyResults, folder: Path, tmp_path: Path) -> None:
     for path in publish(framework_report(filmed), tmp_path):
         assert path.read_bytes() == (folder / path.name).read_bytes()

@@ -210,6 +210,7 @@ def test_losses_under_either_law_of_contact(shield: StudyResults) -> None:
     assert found["contact_angle_cloaked"].note.startswith("8 pairs of units overlap")
 
 
+@pytest.mark.slow
 def test_a_second_design_is_drawn_and_a_kept_one_not(shield: StudyResults) -> None:
     assert values(shield)["second_design"].ours == "optimised again, 6 evaluations"
     assert values(shield)["second_rotation_reduction"].value == pytest.approx(90.0)
@@ -297,6 +298,7 @@ def test_a_motion_in_time_has_a_report_of_its_own(study: StudyResults, tmp_path:
     assert found == pytest.approx(np.sqrt(np.mean(curve**2)), rel=1e-4)  # not that at its end
 
 
+@pytest.mark.slow
 def test_the_page_is_whole(shield: StudyResults, tmp_path: Path) -> None:
     names = {path.name for path in publish(study_report(shield), tmp_path)}
     assert {"path.csv", "robustness.csv", "facts.json", "index.html"} <= names

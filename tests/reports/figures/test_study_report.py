@@ -34,11 +34,13 @@ def test_report_is_complete_and_what_may_not_be_meant_stands_at_its_top(report: 
     assert page.index(note) < page.index('id="figure"')
 
 
+@pytest.mark.slow
 def test_rebuilding_gives_the_same_bytes(study: StudyResults, report: Path, tmp_path: Path) -> None:
     publish(study_report(study), tmp_path / "again")
     assert contents(tmp_path / "again") == contents(report)
 
 
+@pytest.mark.slow
 def test_command_line(tmp_path: Path) -> None:
     paths = shaken_study.write(tmp_path, "quick")
     out = tmp_path / "report"

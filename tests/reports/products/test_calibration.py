@@ -78,6 +78,7 @@ def test_only_what_was_computed_is_called_so_and_all_is_told(synthetic: bool) ->
     assert sorted(highest) == [14.0, 16.0, 17.0, 19.0, 20.0]  # of ux and uy; not the load's 24 N
 
 
+@pytest.mark.slow
 def test_files_are_whole_and_the_same_every_time(tmp_path: Path) -> None:
     origin = provenance.of_recording("{}", {}, synthetic=True, role="calibration")
     source = tmp_path / "calibration.nc"

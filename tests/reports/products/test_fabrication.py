@@ -111,6 +111,7 @@ def test_the_page_maps_the_shims_that_are_bent(tmp_path: Path) -> None:
     assert "0 of 7 beyond 5 %" in page
 
 
+@pytest.mark.slow
 def test_the_page_puts_losses_as_built_beside_those_as_designed(tmp_path: Path) -> None:
     for name, designed, built_loss in (("altered", 0.92, 0.9), ("cloaked", 0.0347, 0.111)):
         built.write(tmp_path / name)

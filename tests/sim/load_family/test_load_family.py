@@ -29,6 +29,7 @@ from sim.solvers import DISPLACEMENT, FREE, Harmonic, LinearRamp, PrescribedMoti
 from sim.structure import Perturbation, draw_copies
 from tests.sim.scene.test_plan import design_of, scene
 from tests.sim.structures import central
+from tests.tables import some
 
 SHAKING = LoadSetup(Harmonic(3.0, 5.0, 0.0), (0.0, np.pi), (1.0, 3.0), (2.0, 16.0))
 PUSHING = LoadSetup(LinearRamp(3.0, 0.2), (0.0, np.pi), (1.0, 3.0))
@@ -105,7 +106,7 @@ def test_the_loss_in_scaled_time_is_that_of_the_load(place: tuple[float, float, 
     assert found == pytest.approx(float(simulate(direct, design).loss) * 9 / amplitude**2, rel=4e-3)
 
 
-@pytest.mark.parametrize(("family", "posed"), [(SHAKEN, scene), (PUSHED, mimicked)])
+@pytest.mark.parametrize(("family", "posed"), some([(SHAKEN, scene), (PUSHED, mimicked)], 1))
 def test_derivatives_by_the_design_and_by_the_load(family: LoadFamily, posed: object) -> None:
     made: Scene = posed()  # type: ignore[operator]
     losses = LoadLosses(made, family, parameters_of_design(made))
@@ -291,6 +292,7 @@ def test_the_worst_loss_is_minimised_and_resumed(tmp_path: Path) -> None:
     assert best.aux.max() < 0.7 * first.aux.max()
 
 
+@pytest.mark.slow
 def test_a_share_of_the_own_loads_counts_in_which_design_is_best(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

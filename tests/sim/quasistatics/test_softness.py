@@ -6,6 +6,7 @@ from sim.quasistatics import SoftestPoint, StaticRecord, StaticSolver, softest_p
 from sim.structure import ConcreteParameters
 from tests.sim.quasistatics.test_snaps import Truss, crumpled, with_law
 from tests.sim.structures import central, squeezed
+from tests.tables import some
 
 RIG = squeezed(11.0, 6)
 SHIFTS = np.random.default_rng(19).uniform(-2.0, 2.0, RIG.space.n_variables)
@@ -29,7 +30,7 @@ def test_a_truss_is_softest_where_its_ligaments_lie_flat() -> None:
     assert found.load == pytest.approx(1.5, abs=1e-4)
 
 
-@pytest.mark.parametrize("share", [1.0, 1.2, 1.35])
+@pytest.mark.parametrize("share", some([1.0, 1.35, 1.2]))
 def test_its_eigenvalue_has_its_slope_in_a_fold_and_out_of_one(share: float) -> None:
     found, _, _ = softest(share * SHIFTS)
     way = np.random.default_rng(3).normal(size=len(SHIFTS))

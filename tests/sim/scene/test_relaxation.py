@@ -10,6 +10,7 @@ from sim.energy import ligament_strain, topology
 from sim.quasistatics import StaticSolver
 from sim.scene import as_built, relaxed
 from tests.sim.structures import taylor_orders
+from tests.tables import some
 
 PLAIN = sim.Material(6.18e-9, 120.0, 1.19, 1.5, 1.5, 1e-8, 1e-7)
 
@@ -151,7 +152,7 @@ def turning(kind: Literal["displacement", "strain_energy"], **changes: object) -
     return pulled(kind).updated(cloak=np.array([5, 6]), turning_slots=True, **changes)
 
 
-@pytest.mark.parametrize("kind", ["displacement", "strain_energy"])
+@pytest.mark.parametrize("kind", some(["strain_energy", "displacement"], 1))
 @pytest.mark.parametrize("static", [True, False], ids=["static", "in time"])
 def test_designs_with_turned_slots_are_those_built_and_pass_the_taylor_test(
     kind: Literal["displacement", "strain_energy"], static: bool

@@ -56,6 +56,7 @@ def loss(scene: Scene, whole: Floats, part: Floats) -> float:
     return float(measure(part[None], values)[0])
 
 
+@pytest.mark.slow
 def test_the_chosen_steps_agree_with_much_shorter_ones() -> None:
     holed = shaken_lattice()
     assert holed.objective.reference is not None

@@ -6,6 +6,7 @@ from sim.core import Floats, SimulationError
 from sim.structure import Lattice, VoidAngleContact, kagome
 from sim.vibration import UnitCell, bands, brillouin_path, cell_of, strained
 from tests.sim.structures import at_rest, rotating_squares
+from tests.tables import some
 
 NO_LOOSE = np.zeros((2, 2))
 
@@ -17,7 +18,7 @@ def made(lattice: Lattice, period: tuple[int, int]) -> UnitCell:
 LATTICES = [(rotating_squares(8), (2, 2)), (kagome(8, 8, 15.0, 1.5, 1.0), (4, 2))]
 
 
-@pytest.mark.parametrize(("lattice", "period"), LATTICES, ids=["quads", "kagome"])
+@pytest.mark.parametrize(("lattice", "period"), some(LATTICES[::-1], 1), ids=["kagome", "quads"])
 def test_a_larger_cell_only_folds_the_bands(lattice: Lattice, period: tuple[int, int]) -> None:
     small, large = made(lattice, period), made(lattice, (2 * period[0], 2 * period[1]))
     one, other = np.pi * np.linalg.inv(small.period).T
