@@ -3,6 +3,7 @@ import gc
 import os
 import signal
 import sys
+from pathlib import Path
 
 import psutil
 import pytest
@@ -32,14 +33,18 @@ _process, _kept = psutil.Process(), [0]
 gc.disable()  # what is imported to collect tests stays: nothing to look through, now or later
 
 
-FIRST = ("test_gradients.py", "workflow", "test_contact_solves.py", "e2e", "docs", "solvers")
-"""Files and folders of a minute: begun first, they keep no worker at the end. Those that compile
-most loops have one between that compiles none, as a worker waits for loops of the other."""
+FIRST = (
+    *("workflow", "docs", "reports", "test_gradients.py"),
+    *("e2e", "test_contact_solves.py", "solvers"),
+)
+"""Files and folders that are begun first, as some take a minute: they keep no worker at the end.
+Before those that compile most loops come some that compile none, while a build beside the tests
+(`.ci/run`) compiles: who wants a loop that another compiles waits for it."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     def place(item: pytest.Item) -> int:
-        names = (item.path.name, item.path.parent.name)
+        names = item.path.relative_to(Path(__file__).parent).parts
         return min((FIRST.index(name) for name in names if name in FIRST), default=len(FIRST))
 
     items.sort(key=place)
