@@ -26,8 +26,8 @@ settings.register_profile(
 )
 settings.load_profile("suite")
 
-LARGE, GROWTH = 900 << 20, 100 << 20
-"""Bytes from which a process gives back memory, and by which it has to grow to do so again."""
+LARGE, GROWTH = 1000 << 20, 150 << 20
+"""Bytes from which a process drops what JAX has compiled, and by which it has to grow till then."""
 _process, _kept = psutil.Process(), [0]
 
 gc.disable()  # what is imported to collect tests stays: nothing to look through, now or later
@@ -60,12 +60,8 @@ def pytest_collection_finish() -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_runtest_teardown() -> None:
-    if _process.memory_info().rss <= max(LARGE, _kept[0] + GROWTH):
-        return
-    trim = ctypes.CDLL(None).malloc_trim
-    trim(0)  # a third of a process was free, and not given back
-    if "jax" in sys.modules and _process.memory_info().rss > LARGE:
+    if "jax" in sys.modules and _process.memory_info().rss > max(LARGE, _kept[0] + GROWTH):
         sys.modules["jax"].clear_caches()
         gc.collect()
-        trim(0)
-    _kept[0] = _process.memory_info().rss
+        ctypes.CDLL(None).malloc_trim(0)
+        _kept[0] = _process.memory_info().rss
