@@ -34,7 +34,6 @@ def test_what_a_camera_sees_is_where_it_was(seed: int) -> None:
     np.testing.assert_allclose(camera.unproject(camera.project(points)), points, atol=1e-9)
 
 
-@pytest.mark.slow
 @given(st.integers(0, 20))
 def test_a_camera_is_found_from_what_it_sees(seed: int) -> None:
     random = np.random.default_rng(seed)

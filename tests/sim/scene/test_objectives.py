@@ -66,7 +66,6 @@ def test_strain_energies_are_the_kernels() -> None:
     np.testing.assert_allclose(losses, np.asarray(found).sum(axis=2) @ WEIGHTS, rtol=1e-13)
 
 
-@pytest.mark.slow
 def test_the_force_of_the_cut_ligaments_is_that_of_the_drive() -> None:
     """And as a part of what is mimicked the loss is the sum of both errors."""
     scene = mimicked().updated(reaction=0.5)
