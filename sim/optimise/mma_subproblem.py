@@ -52,29 +52,25 @@ class Separable:
 
     def slopes(self, x: Floats) -> sp.csr_array:
         """Their derivatives (1 + m, n)."""
-        return _with_entries(self.up, self._entries(x))
+        return _with_entries(self.up, self.entries(x))
 
-    def slope(self, x: Floats, multipliers: Floats) -> Floats:
-        """Derivatives (n,) of their sum, weighted with ``multipliers`` (1 + m,)."""
-        return self._summed(self._entries(x), multipliers)
-
-    def curvature(self, x: Floats, multipliers: Floats) -> Floats:
-        """Diagonal (n,) of the Hessian of that sum."""
-        above, below = self._gaps(x)
-        rise = self._summed(self.up.data, multipliers) * above**-3
-        return 2 * (rise + self._summed(self.down.data, multipliers) * below**-3)
-
-    def _entries(self, x: Floats) -> Floats:
-        """Derivatives (n_entries,) at the places of the coefficients."""
+    def entries(self, x: Floats) -> Floats:
+        """Those derivatives at the places of the coefficients (n_entries,) alone."""
         above, below = self._gaps(x)
         columns = self.up.indices
         return self.up.data * (above**-2)[columns] - self.down.data * (below**-2)[columns]
 
-    def _summed(self, entries: Floats, multipliers: Floats) -> Floats:
-        """Sums the columns (n,) of entries (n_entries,) times their functions' multipliers."""
+    def summed(self, entries: Floats, multipliers: Floats) -> Floats:
+        """Sums (n,) such entries over the functions, weighted with ``multipliers`` (1 + m,)."""
         weighted = entries * multipliers[self._rows]
-        summed = np.bincount(self.up.indices, weighted, minlength=len(self.centre))
-        return np.asarray(summed, dtype=float)
+        total = np.bincount(self.up.indices, weighted, minlength=len(self.centre))
+        return np.asarray(total, dtype=float)
+
+    def curvature(self, x: Floats, multipliers: Floats) -> Floats:
+        """Diagonal (n,) of the Hessian of their sum, weighted with ``multipliers`` (1 + m,)."""
+        above, below = self._gaps(x)
+        rise = self.summed(self.up.data, multipliers) * above**-3
+        return 2 * (rise + self.summed(self.down.data, multipliers) * below**-3)
 
     @cached_property
     def _rows(self) -> Ints:
@@ -160,7 +156,7 @@ class _InteriorPoint:
         problem, weights = self.problem, np.concatenate([[1.0], state.price])
         return np.concatenate(
             [
-                problem.slope(state.x, weights) - state.left + state.right,
+                problem.summed(problem.entries(state.x), weights) - state.left + state.right,
                 WEIGHT - state.price - state.floor,
                 problem.values(state.x)[1:] - state.y + state.slack,
                 state.left * (state.x - problem.low) - barrier,
@@ -186,10 +182,10 @@ class _InteriorPoint:
         problem = self.problem
         below, above = state.x - problem.low, problem.high - state.x
         weights = np.concatenate([[1.0], state.price])
-        matrix = problem.slopes(state.x)[1:]
+        slopes = problem.slopes(state.x)
         diagonal = problem.curvature(state.x, weights) + state.left / below + state.right / above
         give = state.slack / state.price + state.y / state.floor
-        push = -(problem.slope(state.x, weights) - barrier / below + barrier / above)
+        push = -(problem.summed(slopes.data, weights) - barrier / below + barrier / above)
         pull = -(
             problem.values(state.x)[1:]
             - state.y
@@ -197,7 +193,7 @@ class _InteriorPoint:
             + state.y * (WEIGHT - state.price) / state.floor
             - barrier / state.floor
         )
-        dx, price = _saddle(diagonal, matrix, give, push, pull)
+        dx, price = _saddle(diagonal, slopes[1:], give, push, pull)
         floor = WEIGHT - state.price - price - state.floor
         return _State(
             x=dx,

@@ -47,7 +47,7 @@ SLOW = (
     "static_cloak",
     "track_video",
 )
-"""Examples that take four seconds and more."""
+"""The examples that take longest."""
 
 
 @pytest.mark.parametrize(

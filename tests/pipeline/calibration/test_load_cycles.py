@@ -18,7 +18,7 @@ from sim.quasistatics import EquilibriumTrace, StaticRecord, StaticSolver, trace
 from sim.solvers import PrescribedMotion
 from sim.structure import ConcreteParameters
 from tests.pipeline.calibration.specimens import LATTICE
-from tests.tables import refused
+from tests.tables import refused, some
 
 FOLDER = ROOT / "experiments/validation"
 INSTRON = FOLDER.parents[1] / "tests/data/calibration/instron.csv"
@@ -147,9 +147,7 @@ def test_snaps_and_loops_of_the_morpher(morpher: LoadCycles) -> None:
     assert measure_cycle(morpher.records[1], FOLDER).snaps == ([], [])
 
 
-@pytest.mark.parametrize(
-    ("number", "jumps"), [(0, (0, 0)), pytest.param(1, (8, 4), marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("number", "jumps"), some([(0, (0, 0)), (1, (8, 4))], 1))
 def test_equilibria_along_the_arc(morpher: LoadCycles, number: int, jumps: tuple[int, int]) -> None:
     """Within 1 % of each that came with the files, found as they were, and in seconds of one core.
 

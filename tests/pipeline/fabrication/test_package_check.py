@@ -27,7 +27,7 @@ from pipeline.problem.sections import Fabrication
 from pipeline.runtime import UserError
 from tests.pipeline.fabrication import built
 from tests.pipeline.fabrication.files import write_stl
-from tests.tables import cases, tables
+from tests.tables import cases, some, tables
 
 UNITS = "laser/units_sheet1_nominal"
 KERF = "laser/units_sheet1_kerf0.15"
@@ -230,7 +230,6 @@ def test_the_bill_says_which_files_hold_each_unit_and_shim(whole: tuple[Path, Pr
 DxfVersion: TypeAlias = Literal["R2010", "R12"]
 
 OPTIONS: dict[str, dict[str, object]] = tables("fabrication")["options"]
-FIRST, *OTHERS = OPTIONS
 
 
 @pytest.mark.parametrize("version", ["R2010", "R12"])
@@ -241,9 +240,7 @@ def test_a_drawing_says_how_far_it_extends(tmp_path: Path, version: DxfVersion) 
     assert tuple(header["$EXTMAX"])[:2] == (600.0, 300.0)
 
 
-@pytest.mark.parametrize(
-    "name", [FIRST, *(pytest.param(name, marks=pytest.mark.slow) for name in OTHERS)]
-)
+@pytest.mark.parametrize("name", some(OPTIONS, 1))
 def test_other_parameters_make_a_right_package(tmp_path: Path, name: str) -> None:
     folder = tmp_path / "cloaked"
     asked = built.write(folder, OPTIONS[name]).fabrication

@@ -23,6 +23,7 @@ from sim.constraints import ConstraintVector, Limits
 from sim.core import Floats
 from sim.structure import Lattice, design_space, quads
 from tests.pipeline.fabrication import built, handmade
+from tests.tables import some
 
 DESIGN = Path("design.nc")
 LATTICE = quads(4, 4, 15.0, 2.25, np.deg2rad(20.0))
@@ -168,9 +169,7 @@ def test_a_design_with_room_for_straight_slots_has_none_that_turns(seed: int) ->
     assert bent.max() > 0.01
 
 
-@pytest.mark.parametrize(
-    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))]
-)
+@pytest.mark.parametrize("seed", some(range(3), 1))
 def test_slots_that_turn_with_the_design_are_drawn_so(seed: int) -> None:
     """Random shifts and angles, as large as the limits allow."""
     limits = replace(LIMITS, slot_turn=np.deg2rad(30.0))

@@ -15,7 +15,7 @@ from pipeline.tracking.fit import frame_fit
 from pipeline.tracking.motion import Track, track_video
 from pipeline.tracking.reference_frame import RecordingSetup
 from sim.core import Floats, Mask, Singles
-from tests.tables import cases, tables
+from tests.tables import cases, some, tables
 
 
 def shown(name: str, folder: Path, frames: int) -> tuple[WildClip, Track]:
@@ -23,7 +23,7 @@ def shown(name: str, folder: Path, frames: int) -> tuple[WildClip, Track]:
     return clip, tracked(clip)
 
 
-HEAVY = [pytest.param(*row, marks=pytest.mark.slow) for row in tables("tracking")["heavy_clips"]]
+HEAVY = some(map(tuple, tables("tracking")["heavy_clips"]), 0)
 
 
 @cases("tracking", "name, frames, rms, lost", *HEAVY)

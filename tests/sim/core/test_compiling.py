@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.runtime import ROOT
+from tests.tables import some
 
 LOOPS = """
 from sim.core.compiling import compiled
@@ -31,7 +32,7 @@ print(sum(loops.outer.stats.cache_misses.values()), loops.outer(3))
 """
 
 
-@pytest.mark.parametrize("writable", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("writable", some([True, False], 1))
 def test_processes_that_want_a_loop_at_once_compile_it_once(tmp_path: Path, writable: bool) -> None:
     (tmp_path / "loops.py").write_text(LOOPS)
     cache = tmp_path / "cache" if writable else tmp_path / "loops.py" / "none"

@@ -19,6 +19,7 @@ from sim.optimise import (
 from sim.optimise.minimisation import Method
 from sim.optimise.quasi_newton import DAMPING, QuasiNewton
 from tests.sim.optimise import known_problems as problems
+from tests.tables import some
 
 EXACT = sim.SqpOptions(evaluations=150, retreats=0, residual=1e-6, progress=1e-9)
 OPTIONS: dict[Method, Any] = {"sqp": EXACT, "mma": sim.MmaOptions(evaluations=100, residual=1e-5)}
@@ -60,7 +61,7 @@ def test_unconstrained_rosenbrock() -> None:
 
 @pytest.mark.parametrize(
     ("method", "size", "accuracy"),
-    [("sqp", (100, 500), 1e-5), pytest.param("mma", (40, 120), 1e-4, marks=pytest.mark.slow)],
+    some([("sqp", (100, 500), 1e-5), ("mma", (40, 120), 1e-4)], 1),
 )
 def test_hundreds_of_constraints(method: Method, size: tuple[int, int], accuracy: float) -> None:
     known = problems.many(*size)

@@ -9,6 +9,7 @@ from sim.solvers import Harmonic, Pulse
 from sim.structure import Copies, Perturbation, draw_copies
 from tests.sim.scene.test_plan import ANGLES, design_of, scene
 from tests.sim.structures import central
+from tests.tables import some
 
 LOSSES, WEIGHTS = jnp.array([0.2, 1.0, 0.7]), jnp.array([0.5, 0.25, 0.25])
 
@@ -36,7 +37,7 @@ def robust(angles: Floats = ANGLES) -> Scene:
     )
 
 
-@pytest.mark.parametrize("sharpness", [pytest.param(1.0, marks=pytest.mark.slow), 8.0])
+@pytest.mark.parametrize("sharpness", some([8.0, 1.0], 1))
 def test_the_evaluator_is_the_derivative_of_the_p_mean_over_copies(sharpness: float) -> None:
     posed = robust(ANGLES[1:2]).updated(copy_sharpness=sharpness, duration=0.05)
     evaluate = Evaluator(posed, make_plan(posed))
