@@ -22,6 +22,3 @@ rule fig1:
     shell:
         "python -m reports framework --problem {input.problem} --results results"
         " --comparisons {input.comparisons} --out-dir {params.folder} --log {log}"
-
-
-ruleorder: fig1 > report

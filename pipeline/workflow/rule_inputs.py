@@ -60,6 +60,11 @@ def any_of(names: Iterable[str]) -> str:
     return "|".join(sorted(set(names))) or "(?!)"
 
 
+def none_of(names: Iterable[str]) -> str:
+    """Makes a pattern of a study's name that every name but these matches."""
+    return rf"(?!({any_of(names)})\b)\w+"
+
+
 def members(wildcards: Wildcards) -> list[str]:
     """Lists the datasets that a figure of several studies shows."""
     return datasets_of(together()[f"{wildcards.name}{wildcards.preset}"])

@@ -85,7 +85,9 @@ class Sandbox:
     def planned(self, *words: str) -> Counter[str]:
         """Counts the jobs of each rule in a plan."""
         ended = self.run("--dry-run", *words)
-        assert ended.returncode == 0, ended.stdout + ended.stderr
+        said = ended.stdout + ended.stderr
+        assert ended.returncode == 0, said
+        assert "Exception" not in said
         table = ended.stdout.partition("\n---")[2].partition("\ntotal")[0].splitlines()[1:]
         return Counter({rule: int(count) for rule, count in map(str.split, table)})
 
