@@ -17,7 +17,7 @@ _FISHEYE = (0.7, 0.5)
 """A usual one, from which to start, and the standard deviation of the prior."""
 _BETTER = 0.6
 """A fisheye's squared residuals must be so much smaller than those of the usual lens."""
-_MAD = 1.4826
+_MAD, _TINY = 1.4826, 1e-9
 _NODES, _STEP = 48, 0.5
 """Of a grid over the places of a specimen, each way; mm of a difference."""
 
@@ -118,17 +118,19 @@ class _Lens:
 
     def fitted(self) -> Camera:
         """Fits it by robust least squares."""
-        near = least_squares(self._residuals, self._first, x_scale="jac", xtol=1e-12)
-        found = least_squares(
-            self._residuals, near.x, loss="soft_l1", f_scale=3.0, x_scale="jac", xtol=1e-12
-        )
-        return self._camera(found.x)
+        near = self._found(self._first)
+        return self._camera(self._found(near, loss="soft_l1", f_scale=3.0))
 
     def alike(self) -> list[Camera]:
         """Returns the start moved along each axis of its covariance, the inverse of J^T J."""
-        jacobian = least_squares(self._residuals, self._first, max_nfev=1).jac
-        _, size, axes = np.linalg.svd(jacobian, full_matrices=False)
+        _, size, axes = np.linalg.svd(self._slopes(self._first), full_matrices=False)
         return [self._camera(self._first + axis / s) for s, axis in zip(size, axes, strict=True)]
+
+    def _found(self, start: Floats, **loss: str | float) -> Floats:
+        found = least_squares(
+            self._residuals, start, self._slopes, x_scale="jac", xtol=1e-12, **loss
+        )
+        return np.asarray(found.x)
 
     def _camera(self, vector: Floats) -> Camera:
         values, start = vector * self._unit, self._start
@@ -143,6 +145,19 @@ class _Lens:
         bent = made.radial / _USUAL_DISTORTION
         bent = np.sign(bent) * np.sqrt(np.log1p(bent**2))
         return np.concatenate([off, aside, bent, [(vector[12] - start.fisheye) / _FISHEYE[1]]])
+
+    def _slopes(self, vector: Floats) -> Floats:
+        """Differentiates the residuals after the scaled parameters."""
+        made, start = self._camera(vector), self._start
+        prior = np.zeros((5, len(vector)))
+        prior[[0, 1], [8, 9]] = 1 / (_CENTRE_PRIOR * max(start.size))
+        bent = np.maximum(np.abs(made.radial) / _USUAL_DISTORTION, _TINY)
+        steep = bent / np.sqrt(np.log1p(bent**2)) / (1 + bent**2)
+        prior[[2, 3], [10, 11]] = steep / _USUAL_DISTORTION
+        prior[4, 12] = 1 / _FISHEYE[1]
+        seen = made.parameter_slopes(self._points) / self._sigma
+        seen[..., 12] *= bool(start.fisheye)
+        return np.concatenate([seen.reshape(-1, len(vector)), prior]) * self._unit
 
 
 def _errors(camera: Camera, other: Camera, places: Floats) -> Floats:

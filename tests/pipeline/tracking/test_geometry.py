@@ -34,6 +34,33 @@ def test_what_a_camera_sees_is_where_it_was(seed: int) -> None:
     np.testing.assert_allclose(camera.unproject(camera.project(points)), points, atol=1e-9)
 
 
+@given(seeds, st.sampled_from([0.0, 1e-4, 0.7]))
+def test_slopes_of_what_a_camera_sees_are_its_differences(seed: int, fisheye: float) -> None:
+    random = np.random.default_rng(seed)
+    camera = replace(some_camera(random), fisheye=fisheye)
+    points = random.uniform(0, 220, (20, 2))
+    first = np.concatenate([camera.homography.ravel()[:8], camera.centre, camera.radial, [fisheye]])
+
+    def seen(moved: np.ndarray) -> np.ndarray:
+        matrix = np.append(moved[:8], 1.0).reshape(3, 3)
+        lens = {"centre": moved[8:10], "radial": moved[10:12], "fisheye": moved[12]}
+        return replace(camera, homography=matrix, **lens).project(points)
+
+    def difference(along: np.ndarray) -> np.ndarray:
+        return (seen(first + along) - seen(first - along)) / (2 * along.sum())
+
+    steps = np.array([1e-4, 1e-4, 1e-2, 1e-4, 1e-4, 1e-2, 1e-7, 1e-7, 1e-2, 1e-2, 1e-4, 1e-4, 1e-5])
+    slopes = camera.parameter_slopes(points)
+    for index in range(13 if fisheye else 12):
+        rough = difference(np.eye(13)[index] * steps[index])
+        np.testing.assert_allclose(
+            slopes[..., index], rough, atol=1e-5 * np.abs(rough).max() + 1e-7, err_msg=str(index)
+        )
+    for axis, along in enumerate(1e-2 * np.eye(2)):
+        rough = (camera.project(points + along) - camera.project(points - along)) / 0.02
+        np.testing.assert_allclose(camera.jacobian(points)[..., axis], rough, atol=1e-7)
+
+
 @given(st.integers(0, 20))
 def test_a_camera_is_found_from_what_it_sees(seed: int) -> None:
     random = np.random.default_rng(seed)
