@@ -144,7 +144,7 @@ class RankedMechanism(NamedTuple):
     change: Floats  # (n,) of the predicted force's logarithm, constants refitted
     explained: float  # part of the residual's root mean square that it takes away, at that size
     alone: float  # the same, if it acted in the predicted test alone
-    wanted: float  # factor on the size that takes away most
+    wanted: float  # factor on the size that takes away most; NaN of none
 
 
 class FittedSlopes(NamedTuple):
@@ -197,7 +197,8 @@ def _ranked(
         max(1 - np.linalg.norm(residual - sign * each) / np.linalg.norm(residual) for sign in signs)
         for each in (change, alone)
     )
-    wanted = residual @ change / (change @ change)
+    square = change @ change
+    wanted = residual @ change / square if square > 0 else np.nan
     return RankedMechanism(name, size, change, float(explained), float(only), float(wanted))
 
 
