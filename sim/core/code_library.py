@@ -2,7 +2,8 @@
 
 Numba optimises every function with all that it calls, and makes machine code of it, though a loop
 takes a copy of what it calls and optimises that again. Here a library stays LLVM's intermediate
-code, inlined at little cost, until somebody asks for the address of a function in it.
+code, inlined at little cost, until somebody asks for the address of a function in it; when nothing
+is being compiled, as bitcode, a tenth of the memory of a module and the copy that is linked with.
 
 Numba also makes the code of an `inlined` loop anew for each call, then copies it twice, block by
 block, each with all variables of the loop: here it goes in as it was made. And each process that
@@ -15,7 +16,10 @@ from contextlib import contextmanager
 from functools import cached_property
 from types import FunctionType
 from typing import Any, Self
+from weakref import WeakSet
 
+from llvmlite.binding import ModuleRef, parse_bitcode
+from numba.core.cgutils import normalize_ir_text
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.inline_closurecall import InlineWorker
 from numba.core.ir import Block
@@ -48,6 +52,29 @@ class DeferredLibrary(JITCodeLibrary):
     """Holds the code of one loop, in full optimised and made machine code when that is called."""
 
     _has_machine_code = False
+    _module: ModuleRef | None = None
+    _bitcode: bytes | None = None
+
+    @property
+    def _final_module(self) -> ModuleRef:
+        """Returns the module; one that was packed is read again."""
+        if self._module is None:
+            assert self._bitcode is not None
+            self._final_module = module = parse_bitcode(self._bitcode)
+            module.name = normalize_ir_text(self.name)
+            return module
+        return self._module
+
+    @_final_module.setter
+    def _final_module(self, module: ModuleRef) -> None:
+        self._module = module
+        _open.add(self)
+
+    def pack(self) -> None:
+        """Keeps intermediate code as bitcode alone, a tenth of the memory, until it is wanted."""
+        if self._finalized and not self._has_machine_code:
+            self._bitcode = self._bitcode or self._final_module.as_bitcode()
+            self._module = self._shared_module = None  # the latter is a copy to link with
 
     def get_pointer_to_function(self, name: str) -> int:
         """Returns the address of a function of this library; 0 where it has none of that name."""
@@ -92,6 +119,16 @@ class DeferredLibrary(JITCodeLibrary):
         self._has_machine_code = True
         self._dynamic_globals = []
         super()._finalize_final_module()
+
+
+_open: WeakSet[DeferredLibrary] = WeakSet()
+"""Libraries whose modules are in memory."""
+
+
+def pack_all() -> None:
+    """Packs all libraries; to be called when nothing is being compiled."""
+    while _open:
+        _open.pop().pack()
 
 
 def install() -> None:

@@ -88,11 +88,14 @@ def _turn(loop: str) -> Iterator[None]:
     They cannot wait for one another: who waits for a loop holds only loops that call it.
     """
     with _WITHIN, compile_time.counted(), ExitStack() as taken:
+        outermost = not _mine
         if loop not in _mine:
             _mine.add(loop)
             taken.callback(_mine.discard, loop)
             _take(taken, loop)
         yield
+        if outermost:
+            code_library.pack_all()
 
 
 def _take(turn: ExitStack, loop: str) -> None:

@@ -24,6 +24,10 @@ def inner(n):
 @compiled
 def outer(n):
     return inner(n) + inner(n + 1)
+
+@compiled
+def another(n):
+    return 2 * inner(n)
 """
 WANT = """
 import loops
@@ -60,13 +64,17 @@ print(time.monotonic() - began, working_time() - worked)
 """
 
 
-def twice(folder: Path, script: str) -> tuple[list[str], list[str]]:
-    """Runs a script before and after its loop is compiled; returns what it prints."""
+def once(folder: Path, script: str) -> list[str]:
+    """Runs a script that calls the loops, which are compiled in that folder; returns its lines."""
     (folder / "loops.py").write_text(LOOPS)
     places = {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder}", "NUMBA_CACHE_DIR": str(folder)}
-    command = [sys.executable, "-c", script]
     run = partial(subprocess.check_output, env=os.environ | places, text=True, timeout=120)
-    return run(command).splitlines(), run(command).splitlines()
+    return run([sys.executable, "-c", script]).splitlines()
+
+
+def twice(folder: Path, script: str) -> tuple[list[str], list[str]]:
+    """Runs a script before and after its loop is compiled; returns what it prints."""
+    return once(folder, script), once(folder, script)
 
 
 def test_compiling_is_told_once_and_does_not_count_as_work(tmp_path: Path) -> None:
@@ -90,6 +98,20 @@ def test_only_what_python_calls_has_machine_code(tmp_path: Path) -> None:
     first, second = twice(tmp_path, MACHINE_CODE)
     assert first == ["9.0 1", "False False", "3.0 True"]
     assert second == ["9.0 0", "None False", "3.0 True"]  # none of it is even read
+
+
+PACKED = """
+import loops
+loops.outer(3)
+(part,) = loops.inner.callee.overloads.values()
+library = part.library
+print(library._module, library._shared_module, loops.another(3), library._module)
+print(library.get_pointer_to_function(part.fndesc.llvm_func_name) != 0, library._has_machine_code)
+"""
+
+
+def test_code_that_was_packed_is_linked_with_and_becomes_machine_code(tmp_path: Path) -> None:
+    assert once(tmp_path, PACKED) == ["None None 6.0 None", "True True"]
 
 
 INLINED = """
