@@ -26,6 +26,7 @@ def small() -> Scene:
         duration=0.01,
         frequency=20.0,
         cloak=np.array([1, 3]),
+        frozen=None,
         region=np.array([5, 7]),
         samples=21,
     )
