@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.fabrication.parts import Mesh
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip file can hold
-_HEADER = b"millimetres".ljust(80)
+_HEADER = b"millimetres".ljust(80, b"\0")  # programs in C read it as far as a zero
 
 _TYPES = """<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">

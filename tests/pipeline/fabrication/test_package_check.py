@@ -176,6 +176,13 @@ def test_a_package_passes_as_it_is_written(whole: tuple[Path, Problem]) -> None:
     assert not whole[0].with_name("faults").exists()
 
 
+def test_the_name_in_a_mesh_ends_with_a_zero(whole: tuple[Path, Problem]) -> None:
+    """Mesh checkers in C read it, as a text, until there is one."""
+    for path in whole[0].glob("print/units/*.stl"):
+        assert path.read_bytes()[:80].rstrip(b"\0") == b"millimetres"
+        assert path.read_bytes()[79] == 0
+
+
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_damaged_package_fails(package: Path, whole: tuple[Path, Problem], name: str) -> None:
     damage, expected = DAMAGES[name]
