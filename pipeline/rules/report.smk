@@ -1,3 +1,6 @@
+JOINTS = [figure for figure in studies.joints() if "@" not in figure]
+
+
 rule report:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
@@ -20,9 +23,7 @@ rule report:
         "results/{name}{preset}/logs/report.log",
     wildcard_constraints:
         # figures of several studies have no problem of their own
-        name=rule_inputs.none_of(
-            ["fig1", *(figure for figure in studies.joints() if "@" not in figure)]
-        ),
+        name=rule_inputs.none_of(["fig1", *JOINTS]),
     threads: 1
     params:
         study=rule_inputs.options,
@@ -54,9 +55,7 @@ rule joint_report:
     log:
         "results/{name}{preset}/logs/report.log",
     wildcard_constraints:
-        name=rule_inputs.any_of(
-            figure for figure in studies.joints() if "@" not in figure
-        ),
+        name=rule_inputs.any_of(JOINTS),
     threads: 1
     params:
         preset=lambda wildcards: wildcards.preset.replace("@", "--preset "),

@@ -9,7 +9,6 @@ centre of the top left one.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -18,17 +17,9 @@ from pipeline.tracking.geometry.homography import fit_homography
 from sim.core import Floats
 
 _INVERSE_STEPS = 8
-_TINY, _SMALL = 1e-9, 1e-3
+_TINY, _SMALL = 1e-9, 1e-6
 _STEEPEST = 1.55
 """Angle to the axis of a fisheye beyond which nothing of a plane is seen, rad."""
-
-
-class _Radial(NamedTuple):
-    """Holds the distortion at some offsets from its centre."""
-
-    gain: Floats  # (..., 1) by which it lengthens them
-    slope: Floats  # (..., 1) of the gain along the offset, over the offset, 1/px^2
-    slopes: Floats  # (..., 1, 3) of the gain after both radial coefficients and the fisheye's
 
 
 @dataclass(frozen=True)
@@ -63,7 +54,7 @@ class Camera:
     def project(self, points: Floats) -> Floats:
         """Maps points (..., 2) of the plane in mm to pixels (..., 2)."""
         offset = self._flat(points)[0] - self.centre
-        return np.asarray(self.centre + offset * self._radial(offset).gain)
+        return np.asarray(self.centre + offset * self._gain(*self._radius(offset)))
 
     def unproject(self, pixels: Floats) -> Floats:
         """Maps pixels (..., 2) to points (..., 2) of the plane in mm."""
@@ -98,8 +89,7 @@ class Camera:
         flat, depth = self._flat(points)
         h = self.homography
         slope = (h[:2, :2] - flat[..., None] * h[2, :2]) / depth[..., None]
-        offset = flat - self.centre
-        return np.asarray(_bent(offset, self._radial(offset)) @ slope)
+        return np.asarray(self._bent(flat - self.centre) @ slope)
 
     def parameter_slopes(self, points: Floats) -> Floats:
         """Differentiates (..., 2, 13) the pixels after the parameters.
@@ -109,12 +99,11 @@ class Camera:
         """
         flat, depth = self._flat(points)
         offset = flat - self.centre
-        radial = self._radial(offset)
-        bent = _bent(offset, radial)
+        bent = self._bent(offset)
         seen = np.append(points, np.ones((*points.shape[:-1], 1)), axis=-1) / depth
         rows = (bent[..., k, None] * seen[..., None, :] for k in range(2))
         last = -(bent @ flat[..., None]) * seen[..., None, :2]
-        lens = offset[..., None] * radial.slopes
+        lens = offset[..., None] * self._lens_slopes(*self._radius(offset))[..., None, :]
         return np.concatenate([*rows, last, np.eye(2) - bent, lens], axis=-1)
 
     def _flat(self, points: Floats) -> tuple[Floats, Floats]:
@@ -123,38 +112,49 @@ class Camera:
         depth = (points @ h[2, :2] + h[2, 2])[..., None]
         return (points @ h[:2, :2].T + h[:2, 2]) / depth, depth
 
-    def _radial(self, offset: Floats) -> _Radial:
-        """Computes what distortion makes of offsets (..., 2) from its centre.
+    def _radius(self, offset: Floats) -> tuple[Floats, Floats]:
+        """Computes of offsets (..., 2) from the centre the square s (..., 1) of the radius, and r.
 
-        Its gain g(s) = r (1 + k1 t + k2 t^2) for the square s of the radius, where a fisheye f has
-        r = atan(m) / m, m = f sqrt(s) and t = s r^2, and another lens r = 1.
+        A fisheye f has r = atan(m) / m with m = f sqrt(s), another lens r = 1.
         """
-        (first, second), fisheye = self.radial, self.fisheye
         square = np.sum((offset / self.scale) ** 2, axis=-1, keepdims=True)
-        m = np.maximum(fisheye * np.sqrt(square), _TINY)
-        ratio = np.arctan(m) / m if fisheye else np.ones_like(square)
+        if not self.fisheye:
+            return square, np.ones_like(square)
+        m = np.maximum(self.fisheye * np.sqrt(square), _TINY)
+        return square, np.arctan(m) / m
+
+    def _gain(self, square: Floats, ratio: Floats) -> Floats:
+        """Computes r (1 + k1 t + k2 t^2), t = s r^2, by which distortion lengthens an offset."""
         t = square * ratio**2
-        bend, steeper = 1 + t * (first + t * second), first + 2 * t * second
-        # f^2 curl is twice the slope of r after s, and f s curl its slope after f
-        close = -2 / 3 + 4 / 5 * m**2
-        curl = np.where(m < _SMALL, close, (1 / (1 + m**2) - ratio) / m**2)
-        after_square, after_fisheye = fisheye**2 * curl / 2, fisheye * square * curl
-        chain = bend + 2 * t * steeper  # of the gain after r
-        slope = chain * after_square + ratio**3 * steeper
-        lens = [ratio * t, ratio * t**2, chain * after_fisheye]
-        return _Radial(
-            ratio * bend, 2 * slope / self.scale**2, np.concatenate(lens, axis=-1)[..., None, :]
-        )
+        return np.asarray(ratio * (1 + t * (self.radial[0] + t * self.radial[1])))
+
+    def _chain(self, square: Floats, ratio: Floats) -> tuple[Floats, Floats]:
+        """Differentiates the gain after r, and r after s: twice the latter over f^2."""
+        t = square * ratio**2
+        m2 = self.fisheye**2 * square
+        close = -2 / 3 + 4 / 5 * m2
+        curl = np.where(m2 < _SMALL, close, (1 / (1 + m2) - ratio) / np.maximum(m2, _SMALL))
+        return 1 + t * (3 * self.radial[0] + 5 * t * self.radial[1]), curl
+
+    def _bent(self, offset: Floats) -> Floats:
+        """Differentiates (..., 2, 2) the pixels after those without distortion."""
+        square, ratio = self._radius(offset)
+        after_ratio, curl = self._chain(square, ratio)
+        steeper = self.radial[0] + 2 * square * ratio**2 * self.radial[1]
+        slope = after_ratio * self.fisheye**2 * curl / 2 + ratio**3 * steeper
+        outer = offset[..., :, None] * offset[..., None, :] * (2 / self.scale**2)
+        return self._gain(square, ratio)[..., None] * np.eye(2) + slope[..., None] * outer
+
+    def _lens_slopes(self, square: Floats, ratio: Floats) -> Floats:
+        """Differentiates (..., 3) the gain after both radial coefficients and the fisheye's."""
+        t = square * ratio**2
+        after_ratio, curl = self._chain(square, ratio)
+        fisheye = after_ratio * self.fisheye * square * curl
+        return np.concatenate([ratio * t, ratio * t**2, fisheye], axis=-1)
 
     def px_per_mm(self, points: Floats) -> Floats:
         """Returns the scale (...) at points (..., 2), px/mm."""
         return np.asarray(np.sqrt(np.abs(np.linalg.det(self.jacobian(points)))))
-
-
-def _bent(offset: Floats, radial: _Radial) -> Floats:
-    """Differentiates (..., 2, 2) the pixels after those without distortion."""
-    outer = offset[..., :, None] * offset[..., None, :]
-    return np.asarray(radial.gain[..., None] * np.eye(2) + radial.slope[..., None] * outer)
 
 
 def camera_of(dataset: xr.Dataset) -> Camera | None:

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -68,8 +67,9 @@ def once(folder: Path, script: str) -> list[str]:
     """Runs a script that calls the loops, which are compiled in that folder; returns its lines."""
     (folder / "loops.py").write_text(LOOPS)
     places = {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder}", "NUMBA_CACHE_DIR": str(folder)}
-    run = partial(subprocess.check_output, env=os.environ | places, text=True, timeout=120)
-    return run([sys.executable, "-c", script]).splitlines()
+    run = [sys.executable, "-c", script]
+    told = subprocess.check_output(run, env=os.environ | places, text=True, timeout=120)
+    return told.splitlines()
 
 
 def twice(folder: Path, script: str) -> tuple[list[str], list[str]]:
