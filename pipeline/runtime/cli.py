@@ -98,7 +98,12 @@ def run(work: Work, made: argparse.ArgumentParser, argv: Sequence[str] | None = 
 
 
 def imported(name: str) -> ModuleType:
-    """Imports a module with all that it needs: it stays, and is not looked through as garbage."""
+    """Imports a module with all that it needs: it stays, and is not looked through as garbage.
+
+    Only the first time: what a process made since then would never be freed.
+    """
+    if name in sys.modules:
+        return sys.modules[name]
     gc.disable()
     try:
         return import_module(name)

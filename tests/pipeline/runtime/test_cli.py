@@ -1,5 +1,6 @@
 import argparse
 import errno
+import gc
 import logging
 import os
 import signal
@@ -77,6 +78,15 @@ def test_a_bug_names_the_log_or_shows_its_traceback(tmp_path: Path, capsys: Outp
     (tmp_path / "file").touch()
     assert run(None, "--log", str(tmp_path / "file" / "toy.log")) == 2
     assert capsys.readouterr().err.startswith("error: ")
+
+
+def test_a_module_that_is_there_keeps_nothing_from_being_freed() -> None:
+    name = "pipeline.stages.select"
+    first = cli.imported(name)
+    kept = gc.get_freeze_count()
+    made_since: list[list[int]] = [[] for _ in range(1000)]
+    assert cli.imported(name) is first
+    assert gc.get_freeze_count() < kept + len(made_since)
 
 
 def test_an_error_shows_only_what_it_knows() -> None:
