@@ -9,7 +9,7 @@ PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains certif
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
 INSTALL = $(BIN)/python pipeline/workflow/install_lock.py $(if $(WHEELS),--wheels "$(abspath $(WHEELS))")
-PYTEST ?= -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients --ignore tests/cluster --ignore tests/slow -m 'not slow'
+PYTEST ?= -n auto --dist loadscope --no-loadscope-reorder --ignore tests/clients --ignore tests/cluster --ignore tests/slow -m 'not slow'
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
@@ -115,7 +115,7 @@ docs: dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
 test-slow: dev
-	$(BIN)/python -m pytest -m slow --ignore tests/clients --ignore tests/cluster
+	$(BIN)/python -m pytest -n auto --dist loadfile -m slow --ignore tests/clients --ignore tests/cluster
 
 clients: dev
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests/clients

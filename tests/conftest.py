@@ -3,11 +3,12 @@ import gc
 import os
 import signal
 import sys
-from pathlib import Path
 
 import psutil
 import pytest
 from hypothesis import HealthCheck, settings
+from xdist.remote import Producer
+from xdist.scheduler import LoadScopeScheduling
 
 from pipeline.runtime import pin
 
@@ -29,23 +30,46 @@ settings.load_profile("suite")
 LARGE, GROWTH = 1000 << 20, 150 << 20
 """Bytes from which a process drops what JAX has compiled, and by which it has to grow till then."""
 _process, _kept = psutil.Process(), [0]
+_frozen = [0]  # objects: a stage that is imported keeps all that there is, garbage too
 
 gc.disable()  # what is imported to collect tests stays: nothing to look through, now or later
+gc.set_threshold(20_000, 20, 50)  # JAX makes so much that a process looked through it 14 000 times
 
 
 FIRST = (
-    *("workflow", "docs", "reports", "test_gradients.py"),
-    *("e2e", "test_contact_solves.py", "solvers"),
+    *("workflow", "docs", "reports", "sim/solvers", "e2e"),
+    *("pipeline/tracking", "sim/scene", "pipeline/fabrication"),
 )
-"""Files and folders that are begun first, as some take a minute: they keep no worker at the end.
+"""Folders that are begun first, as they take a minute and more: they keep no process at the end.
 Before those that compile most loops come some that compile none, while a build beside the tests
 (`.ci/run`) compiles: who wants a loop that another compiles waits for it."""
 
 
+def folder_of(nodeid: str) -> str:
+    """The folder whose tests one process runs: each of `sim` and `pipeline`, others as a whole.
+
+    They share what takes long to make: fixtures of a session, functions that JAX has compiled.
+    """
+    above = nodeid.partition("::")[0].split("/")[1:-1]
+    return "/".join(above[: 2 if above[:1] in (["sim"], ["pipeline"]) else 1])
+
+
+class ByFolder(LoadScopeScheduling):  # type: ignore[misc]
+    """Gives folders to processes, in the order of collection."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return folder_of(nodeid)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByFolder | None:
+    return ByFolder(config, log) if config.getvalue("dist") == "loadscope" else None
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     def place(item: pytest.Item) -> int:
-        names = item.path.relative_to(Path(__file__).parent).parts
-        return min((FIRST.index(name) for name in names if name in FIRST), default=len(FIRST))
+        folder = folder_of(item.nodeid)
+        return FIRST.index(folder) if folder in FIRST else len(FIRST)
 
     items.sort(key=place)
     for item in items:
@@ -62,6 +86,12 @@ def pytest_collection_finish() -> None:
 def pytest_runtest_teardown() -> None:
     if "jax" in sys.modules and _process.memory_info().rss > max(LARGE, _kept[0] + GROWTH):
         sys.modules["jax"].clear_caches()
-        gc.collect()
+        if gc.get_freeze_count() > _frozen[0]:
+            gc.unfreeze()
+            gc.collect()
+            gc.freeze()
+            _frozen[0] = gc.get_freeze_count()
+        else:
+            gc.collect()
         ctypes.CDLL(None).malloc_trim(0)
         _kept[0] = _process.memory_info().rss

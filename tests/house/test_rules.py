@@ -5,12 +5,13 @@ import re
 import subprocess
 import sys
 from collections import Counter, defaultdict
+from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 
 import pytest
 
 from pipeline.runtime import ROOT
-from tests.house.project import PACKAGES, Module, module_names, modules, resolved
+from tests.house.project import PACKAGES, Module, forget, module_names, modules, resolved
 
 LARGE = {"pipeline/stages", "pipeline/problem/sections", "docs/examples"}
 FLOORS = {
@@ -58,6 +59,12 @@ FRAGMENTS = {
 LOCAL_WORDS = ("asked", "told", "wanted", "beside", "whole", "casebook", "meeting", "strangers",
                "admission", "checked", "course", "reconsider", "filmed")  # fmt: skip
 FEWEST_LOCAL_WORDS = 4
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _trees_end_with_these_tests() -> Iterator[None]:
+    yield
+    forget()
 
 
 def test_folders_hold_few_modules() -> None:
