@@ -90,15 +90,18 @@ SHOWN = ("simulate", "as_built", "virtual_specimen", "film_render", "track", "co
 
 @pytest.mark.parametrize(
     ("old", "new", "rerun"),
-    [
-        ("points: 15", "points: 14", only("sweep", "sweep_gather", "report")),
-        ("cycles: 4", "cycles: 3", only(*SHOWN)),
-        ("title: Shielding", "title: Hiding", only("report")),
-        ("evaluations: 60", "evaluations: 61", STUDY | {"design": 1}),
-        ("amplitude: 4.5 mm", "amplitude: 4.4 mm", STUDY),
-        ("amplitude: 4.5 mm", "amplitude: 0.45 cm", {}),
-        ("# Figure 2", "# The second figure", {}),
-    ],
+    some(
+        [
+            ("evaluations: 60", "evaluations: 61", STUDY | {"design": 1}),
+            ("cycles: 4", "cycles: 3", only(*SHOWN)),
+            ("amplitude: 4.5 mm", "amplitude: 0.45 cm", {}),
+            ("points: 15", "points: 14", only("sweep", "sweep_gather", "report")),
+            ("title: Shielding", "title: Hiding", only("report")),
+            ("amplitude: 4.5 mm", "amplitude: 4.4 mm", STUDY),
+            ("# Figure 2", "# The second figure", {}),
+        ],
+        3,
+    ),
 )
 def test_edits_rerun_dependents(built: Sandbox, old: str, new: str, rerun: dict[str, int]) -> None:
     built.edit(old, new)

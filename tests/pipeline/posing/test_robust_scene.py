@@ -130,7 +130,7 @@ def _starting(fig2: Path, folder: Path, own: dict[str, object], again: dict[str,
         pytest.param(
             {"void": OFF_CENTRE, "optimiser": {"symmetry": "none"}}, {}, marks=pytest.mark.slow
         ),
-        ({}, {"optimiser": {"symmetry": "none"}}),
+        pytest.param({}, {"optimiser": {"symmetry": "none"}}, marks=pytest.mark.slow),
         ({}, {"optimiser": {"start": "previous"}}),
     ],
     ids=["same", "void", "other symmetry", "first of several"],

@@ -53,7 +53,7 @@ def test_threads_change_no_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         ("rolling_shutter", 14),
         pytest.param("motion_blur_untold", 14, marks=pytest.mark.slow),
         pytest.param("hand", 12, marks=pytest.mark.slow),
-        ("mains_flicker", 24),
+        pytest.param("mains_flicker", 24, marks=pytest.mark.slow),
         pytest.param("returns_h264", 48, marks=pytest.mark.slow),
     ],
 )

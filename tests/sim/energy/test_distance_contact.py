@@ -139,7 +139,7 @@ def mixed_of_definition(
     return jax.grad(along)(parts)
 
 
-@pytest.fixture(scope="module", params=some(range(6)))
+@pytest.fixture(scope="module", params=some(range(6), 1))
 def case(request: pytest.FixtureRequest) -> Crowd:
     return crowd(request.param)
 

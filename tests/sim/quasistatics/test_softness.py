@@ -30,7 +30,7 @@ def test_a_truss_is_softest_where_its_ligaments_lie_flat() -> None:
     assert found.load == pytest.approx(1.5, abs=1e-4)
 
 
-@pytest.mark.parametrize("share", some([1.0, 1.35, 1.2]))
+@pytest.mark.parametrize("share", some([1.35, 1.0, 1.2], 1))
 def test_its_eigenvalue_has_its_slope_in_a_fold_and_out_of_one(share: float) -> None:
     found, _, _ = softest(share * SHIFTS)
     way = np.random.default_rng(3).normal(size=len(SHIFTS))
