@@ -13,10 +13,10 @@ from xdist.scheduler import LoadScopeScheduling
 from pipeline.runtime import pin
 
 pin()  # before anything imports the libraries that this is about
-# What is tested in this process runs but a few times: XLA's optimiser took a quarter of the
-# processor's time in tests of shapes and of what can be made (85 s without this line, 65 with it).
-# The processes that tests start pin their own flags, and run as they do for users.
-os.environ["XLA_FLAGS"] += " --xla_backend_optimization_level=0"
+# What is tested in this process runs but a few times: most of the time that JAX takes in tests of
+# shapes and of what can be made is XLA's, to optimise and to emit (cold 49 s without the second
+# flag, 30 with it). The processes that tests start pin their own flags, and run as for users.
+os.environ["XLA_FLAGS"] += " --xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
 
 # What a shell runs in the background ignores Ctrl-C, and the runs under test would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
