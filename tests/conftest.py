@@ -46,12 +46,12 @@ Before those that compile most loops come some that compile none, while a build 
 
 
 def folder_of(nodeid: str) -> str:
-    """The folder whose tests one process runs: each of `sim` and `pipeline`, others as a whole.
+    """The folder whose tests one process runs; those of `reports` are one.
 
     They share what takes long to make: fixtures of a session, functions that JAX has compiled.
     """
     above = nodeid.partition("::")[0].split("/")[1:-1]
-    return "/".join(above[: 2 if above[:1] in (["sim"], ["pipeline"]) else 1])
+    return "/".join(above[: 1 if "reports" in above else 2])
 
 
 class ByFolder(LoadScopeScheduling):  # type: ignore[misc]

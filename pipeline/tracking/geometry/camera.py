@@ -89,7 +89,8 @@ class Camera:
         flat, depth = self._flat(points)
         h = self.homography
         slope = (h[:2, :2] - flat[..., None] * h[2, :2]) / depth[..., None]
-        return np.asarray(self._bent(flat - self.centre) @ slope)
+        offset = flat - self.centre
+        return np.asarray(self._bent(offset, *self._radius(offset)) @ slope)
 
     def parameter_slopes(self, points: Floats) -> Floats:
         """Differentiates (..., 2, 13) the pixels after the parameters.
@@ -99,11 +100,12 @@ class Camera:
         """
         flat, depth = self._flat(points)
         offset = flat - self.centre
-        bent = self._bent(offset)
+        radius = self._radius(offset)
+        bent = self._bent(offset, *radius)
         seen = np.append(points, np.ones((*points.shape[:-1], 1)), axis=-1) / depth
         rows = (bent[..., k, None] * seen[..., None, :] for k in range(2))
         last = -(bent @ flat[..., None]) * seen[..., None, :2]
-        lens = offset[..., None] * self._lens_slopes(*self._radius(offset))[..., None, :]
+        lens = offset[..., None] * self._lens_slopes(*radius)[..., None, :]
         return np.concatenate([*rows, last, np.eye(2) - bent, lens], axis=-1)
 
     def _flat(self, points: Floats) -> tuple[Floats, Floats]:
@@ -136,9 +138,8 @@ class Camera:
         curl = np.where(m2 < _SMALL, close, (1 / (1 + m2) - ratio) / np.maximum(m2, _SMALL))
         return 1 + t * (3 * self.radial[0] + 5 * t * self.radial[1]), curl
 
-    def _bent(self, offset: Floats) -> Floats:
+    def _bent(self, offset: Floats, square: Floats, ratio: Floats) -> Floats:
         """Differentiates (..., 2, 2) the pixels after those without distortion."""
-        square, ratio = self._radius(offset)
         after_ratio, curl = self._chain(square, ratio)
         steeper = self.radial[0] + 2 * square * ratio**2 * self.radial[1]
         slope = after_ratio * self.fisheye**2 * curl / 2 + ratio**3 * steeper
