@@ -15,6 +15,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Looks up the stage that the first word names, and runs it with the others."""
     with streams.unread():
         return _main(argv)
+    return 0  # nobody read on
 
 
 def _main(argv: Sequence[str] | None) -> int:
@@ -75,4 +76,4 @@ def overview() -> str:
 
 if __name__ == "__main__":
     code = _delegated()
-    sys.exit(main() if code is None else code)
+    cli.leave(main() if code is None else code)

@@ -14,6 +14,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     with streams.unread():
         return _main(argv)
+    return 0  # nobody read on
 
 
 def _main(argv: Sequence[str] | None) -> int:
@@ -39,4 +40,4 @@ def _run(kind: str, command: ReportCommand, words: Sequence[str]) -> int:
 if __name__ == "__main__":
     asked = REPORTS.get("".join(sys.argv[1:2]))
     code = delegate(f"{PREFIX}reports", PREFIX + asked.module) if asked else None
-    sys.exit(main() if code is None else code)
+    cli.leave(main() if code is None else code)

@@ -1,5 +1,6 @@
 # A recording that was filmed is tracked from its own folder; one that is virtual is rendered first,
-# of a specimen of its own where it describes one.
+# of a specimen of its own where it describes one. Nothing else takes as long after a design: it begins
+# before copies and sweeps, which others wait less for.
 rule virtual_specimen:
     input:
         recording="experiments/{name}/recordings/{recording}.yaml",
@@ -9,6 +10,7 @@ rule virtual_specimen:
         "results/{name}{preset}/recordings/{recording}_specimen.nc",
     log:
         "results/{name}{preset}/logs/specimen_{recording}.log",
+    priority: 1
     threads: 1
     params:
         study=rule_inputs.options,
@@ -50,6 +52,7 @@ rule film_render:
         truth="results/{name}{preset}/recordings/{recording}_truth.nc",
     log:
         "results/{name}{preset}/logs/render_{recording}.log",
+    priority: 1
     threads: 1
     params:
         source=source_hash("pipeline.stages.film"),

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, cast
 
-from pipeline.runtime import streams
+from pipeline.runtime import cli, streams
 
 SOCKET = "METACLOAK_STAGES"
 """Names the server's socket in the environment of a workflow's jobs."""
@@ -225,10 +225,11 @@ def serve(path: Path, listener: int, life: int) -> None:
     request = _Server(socket.socket(fileno=listener), life).serve()
     if request is not None:
         runpy.run_module(request.program, run_name="__main__", alter_sys=True)
-        sys.exit(0)
+        cli.leave(0)
     path.unlink(missing_ok=True)
     path.parent.rmdir()
 
 
 if __name__ == "__main__":
     serve(Path(sys.argv[1]), *map(int, sys.argv[2:4]))
+    cli.leave(0)

@@ -174,3 +174,30 @@ def test_a_reader_that_stops_gets_no_traceback(module: str, words: list[str]) ->
     running.wait()
     assert "Traceback" not in told
     assert "BrokenPipe" not in told
+
+
+LEAVING = """
+import atexit, threading, time
+from pipeline.runtime import cli
+
+class Heavy:
+    def __del__(self):
+        print("taken apart")
+
+def late():
+    time.sleep(0.2)
+    print("of the thread")
+
+heavy = Heavy()
+atexit.register(print, "of the end")
+threading.Thread(target=late).start()
+print("not flushed", end="; ")
+cli.leave(3)
+"""
+
+
+def test_threads_end_and_the_registered_is_called_and_objects_are_left() -> None:
+    words = [sys.executable, "-c", LEAVING]
+    ended = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode == 3, ended.stderr
+    assert ended.stdout == "not flushed; of the thread\nof the end\n"
