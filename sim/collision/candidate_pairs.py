@@ -80,11 +80,15 @@ def contact_arrays(
     )
 
 
+def new_pairs(contacts: ContactArrays) -> Ints:
+    """Lists the pairs (n, 2) of units for which a solve ended: the tangent has no room for them."""
+    return contacts.cache.new_pairs[: contacts.cache.found[1]].copy()
+
+
 def raise_new_pairs(contacts: ContactArrays) -> None:
     """Raises ``NewContactPairs`` if a solve ended since the tangent has no room for a pair."""
-    count = contacts.cache.found[1]
-    if count > 0:
-        raise NewContactPairs(contacts.cache.new_pairs[:count].copy())
+    if len(pairs := new_pairs(contacts)) > 0:
+        raise NewContactPairs(pairs)
 
 
 def _empty_cache(candidate_pairs: CandidatePairs, n_units: int) -> NeighbourCache:

@@ -4,7 +4,7 @@ The broad phase sweeps all units and notes the gap of each pair of them that may
 pair shrinks by no more than its units have moved since, so most pairs are skipped without a look at
 their vertices; once any unit has moved by ``margin``, the sweep is repeated. Pairs whose coupling
 the tangent has no room for ("new pairs") are noted before they come within reach: the state then
-counts as not admissible, and the solve is to be repeated with more room.
+counts as not admissible, and the solve is to go on with more room.
 """
 
 import math
@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from sim.collision.polygons import ContactArrays, crosses, gap_between, is_inside, place_vertices
-from sim.core import Floats, Ints, compiled
+from sim.core import Floats, Ints, compiled, inlined
 
 MAX_NEW_PAIRS = 256
 TERMS_PER_VERTEX = 16
@@ -142,6 +142,12 @@ def is_same(one: Floats, other: Floats) -> bool:
     return d == len(one)
 
 
+@inlined
+def units_met(contacts: ContactArrays) -> bool:
+    """Tells whether units met for whose coupling the tangent has no room."""
+    return contacts.cache.found[1] > 0
+
+
 @compiled
 def find(motion: Floats, contacts: ContactArrays) -> int:
     """Lists the vertices and edges in contact in a state (n_dofs,) in ``cache.terms``.
@@ -155,7 +161,7 @@ def find(motion: Floats, contacts: ContactArrays) -> int:
         place_vertices(motion, contacts)
         _follow_motion(motion, contacts)
         _collect(contacts)
-    return -1 if cache.found[1] > 0 else cache.found[0]
+    return -1 if units_met(contacts) else cache.found[0]
 
 
 @compiled

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim.collision import units_met
 from sim.core import Floats, Ints, compiled, inlined
 from sim.energy import (
     Bars,
@@ -254,7 +255,7 @@ def _advance(
     _towards(motion, load, 1.0, system, work)
     way = _length(work.product, system.held, system)
     done, kind, ended = 0.0, SMOOTH, np.nan
-    while done < 1.0:
+    while done < 1.0 and not units_met(system.contacts):
         counts[INCREMENTS] += 1
         ahead = _ahead(pace[INCREMENT], 1.0 - done, way, pace)
         share = ahead / (1.0 - done)
@@ -322,10 +323,11 @@ def _repeat(
 
 @compiled
 def follow(
-    loads: Floats, bends: Floats, trusted: Ints, leaves: bool, sense: float, system: System,
-    work: Workspace, relative: float, absolute: float, drag: Floats, branch: Branch, counts: Ints,
+    loads: Floats, known: int, bends: Floats, trusted: Ints, leaves: bool, sense: float,
+    system: System, work: Workspace, relative: float, absolute: float, drag: Floats, branch: Branch,
+    counts: Ints,
 ) -> tuple[int, float]:  # fmt: skip
-    """Fills a branch with the equilibria at ``loads`` (n_loads, n_held).
+    """Fills a branch with the equilibria at ``loads`` (n_loads, n_held), the first `known` kept.
 
     `bends` (n_loads, n_dofs) is by how much the path of a similar structure departs from its
     tangent between two loads, to be tried first where `trusted` (n_loads,). Where the path ends,
@@ -354,7 +356,11 @@ def follow(
             return 0, 0.0
     first = lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE)
     pace = np.array([1.0, first, 0.0, first])
-    for p in range(len(loads)):
+    if known > 0:
+        motion[:] = branch.states[known - 1]
+        factorise_tangent(motion, system, work, 0.0, counts)
+        pace[VALUE] = lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE)
+    for p in range(known, len(loads)):
         done = 0.0
         _towards(motion, loads[p], 1.0, system, work)
         _tangent_step(motion, system, work)
@@ -370,7 +376,7 @@ def follow(
             )  # fmt: skip
             branch.jumped[p], branch.snapped[p] = max(kind, branch.jumped[p]), ended
         branch.states[p] = motion
-        if done < 1.0:
+        if done < 1.0 or units_met(system.contacts):
             return p, done
         pace[VALUE] = lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE)
         branch.eigenvalue[p], branch.stable[p] = pace[VALUE], 1

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sim.collision import raise_new_pairs
+from sim.collision import new_pairs, raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
-from sim.energy import Topology, as_values, empty_bars, system_of, workspace
+from sim.energy import System, Topology, as_values, empty_bars, system_of, workspace
 from sim.quasistatics.equilibrium_path import MOST_SNAPS, Branch, adjoint, follow
 from sim.solvers import PrescribedMotion, check_connected, check_ligaments, check_start
 from sim.structure import ConcreteParameters
@@ -71,31 +71,42 @@ class StaticSolver:
         self, values: ConcreteParameters, drive: PrescribedMotion
     ) -> tuple[Floats, Floats, StaticRecord]:
         """See ``Solver``."""
-        top = self.topology
-        check_connected(top)
-        loads = drive.values(top.held, self.passed)
-        branch = _empty_branch(len(loads), top.n_dofs)
+        check_connected(self.topology)
+        loads = drive.values(self.topology.held, self.passed)
+        branch = _empty_branch(len(loads), self.topology.n_dofs)
         counts = np.zeros(4, dtype=np.int64)
-        bends, trusted = self._known(branch.states)
+        top = self.topology
         system = system_of(top, values)
-        rounding = ROUNDING + ROUNDING_OF_MOTION * np.abs(loads * top.scale[top.held]).max(
-            initial=0
-        )
-        floor = max(self.absolute, rounding) * float(values.law[:, 0].max())
         check_start(top, values, system.contacts, np.zeros(top.n_dofs))
-        drag = system.damping if (system.damping[top.free_dofs] > 0).all() else top.scale**2
-        reached, fraction = follow(
-            loads, bends, trusted, self.leaves, self.sense, system, workspace(system),
-            self.relative, floor, drag, branch, counts,
-        )  # fmt: skip
-        raise_new_pairs(system.contacts)
+        reached, fraction = self._follow(values, loads, 0, top, system, branch, counts)
+        while len(met := new_pairs(system.contacts)) > 0:  # goes on from the last load
+            top = top.coupling(met)
+            system = system_of(top, values)
+            _forget(branch, reached)
+            reached, fraction = self._follow(values, loads, reached, top, system, branch, counts)
         if reached < len(loads):
             if self.leaves or not branch.jumped[reached]:
                 raise self._ended(values, branch.states[: reached + 1], fraction)
             branch.states[reached:] = np.nan
         check_ligaments(top, values, branch.states[:reached])
-        record = self._record(branch, counts)
+        record = self._record(branch, counts, top)
         return record.states.copy(), np.zeros_like(record.states), record
+
+    def _follow(
+        self, values: ConcreteParameters, loads: Floats, known: int, top: Topology, system: System,
+        branch: Branch, counts: Ints,
+    ) -> tuple[int, float]:  # fmt: skip
+        """Follows the path on from its first `known` loads; see ``follow``."""
+        bends, trusted = self._known(branch.states)
+        rounding = ROUNDING + ROUNDING_OF_MOTION * np.abs(loads * top.scale[top.held]).max(
+            initial=0
+        )
+        floor = max(self.absolute, rounding) * float(values.law[:, 0].max())
+        drag = system.damping if (system.damping[top.free_dofs] > 0).all() else top.scale**2
+        return follow(
+            loads, known, bends, trusted, self.leaves, self.sense, system, workspace(system),
+            self.relative, floor, drag, branch, counts,
+        )  # fmt: skip
 
     def _ended(
         self, values: ConcreteParameters, states: Floats, fraction: float
@@ -114,7 +125,7 @@ class StaticSolver:
             states=states[:-1][self.substeps - 1 :: self.substeps],
         )
 
-    def _record(self, branch: Branch, counts: Ints) -> StaticRecord:
+    def _record(self, branch: Branch, counts: Ints, topology: Topology) -> StaticRecord:
         """Keeps the output loads of all that were passed."""
         last = slice(self.substeps - 1, None, self.substeps)
         before = np.concatenate([[0.0], self.passed[:-1]])
@@ -129,7 +140,7 @@ class StaticSolver:
             np.fmax.reduce(snapped, axis=1),
             branch.eigenvalue[last].copy(),
             counts,
-            self.topology,
+            topology,
             before[ways] + (places - ways) * (self.passed - before)[ways],
         )
 
@@ -174,3 +185,10 @@ def _empty_branch(n_loads: int, n_dofs: int) -> Branch:
     return Branch(
         states, tangents, stable, jumped, snapped, np.full(MOST_SNAPS, np.nan), eigenvalue
     )
+
+
+def _forget(branch: Branch, known: int) -> None:
+    """Clears what a branch holds beyond its first `known` loads but states."""
+    branch.jumped[known:] = 0
+    branch.snapped[known:] = np.nan
+    branch.snaps[branch.snaps >= known] = np.nan

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ import pytest
 from sim.collision import CandidatePairs
 from sim.core import Floats, NewContactPairs, SimulationError
 from sim.energy import observe
-from sim.quasistatics import StaticSolver, eigenvalue_and_slopes
+from sim.quasistatics import StaticSolver, eigenvalue_and_slopes, static_solver
+from sim.quasistatics.equilibrium_path import follow
 from sim.solvers import LinearRamp, Records, Solver, adjoint_cases, solve_case, solve_cases
 from sim.structure import clearance, close_pairs, displaced
 from sim.time_integration import ExplicitSolver, ImplicitSolver
@@ -111,6 +113,22 @@ def test_units_meet_that_were_far_apart_at_rest() -> None:
     states = path(rig, StaticSolver(rig.topology, np.linspace(0.25, 1.0, 4)))
     assert_clear_in_contact(rig, states)
     assert states[-1, 1, 0] < -0.4
+
+
+def test_a_path_goes_on_from_the_load_before_units_met(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = squeezed(10.0, distance=DISTANCE)
+    contact, loads = rig.topology.contact, np.linspace(0.05, 1.0, 20)
+    assert isinstance(contact, CandidatePairs)
+    bare = replace(rig.topology, contact=replace(contact, pairs=contact.pairs[:1]))
+    roomy = solve_case(StaticSolver(rig.topology, loads), rig.values, rig.drive)[2]
+    followed = Mock(wraps=follow)
+    monkeypatch.setattr(static_solver, "follow", followed)
+    found = solve_case(StaticSolver(bare, loads), rig.values, rig.drive)[2]
+    begun = [call.args[1] for call in followed.call_args_list]
+    assert begun == sorted(begun)
+    assert begun[1] > 0
+    np.testing.assert_allclose(found.states, roomy.states, atol=1e-9)
+    np.testing.assert_array_equal(found.jumped, roomy.jumped)
 
 
 @pytest.mark.parametrize("kind", ["static", *DYNAMIC])
