@@ -1,6 +1,6 @@
 # A recording that was filmed is tracked from its own folder; one that is virtual is rendered first,
-# of a specimen of its own where it describes one. Nothing else takes as long after a design: it begins
-# before copies and sweeps, which others wait less for.
+# of a specimen of its own where it describes one. Of all that follows a design this takes longest,
+# and tracking waits for it: it begins before copies and sweeps.
 rule virtual_specimen:
     input:
         recording="experiments/{name}/recordings/{recording}.yaml",

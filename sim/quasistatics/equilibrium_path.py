@@ -245,8 +245,8 @@ def _advance(
 
     `motion` is moved; `load` (n_held,) is that of `number`; `pace` (4,), see ``INCREMENT``, and
     `mode` (n_free,), the eigenvector S v of the smallest eigenvalue, change; `predicted` (n_dofs,)
-    is scratch; `snaps` gathers them. Unless it `leaves`, it stops where the path ends. For the rest
-    see `_leave`.
+    is scratch; `snaps` gathers them. Unless it `leaves`, it stops where the path ends; it does
+    where units met for which the tangent has no room. For the rest see `_leave`.
 
     Returns:
         the fraction of the way reached, with ``motion`` there; the kind of the way; and where on it
@@ -322,6 +322,31 @@ def _repeat(
 
 
 @compiled
+def _come_to_rest(
+    motion: Floats, mode: Floats, sense: float, drag: Floats, relative: float, absolute: float,
+    system: System, work: Workspace, counts: Ints,
+) -> tuple[float, int]:  # fmt: skip
+    """Moves the unloaded structure to its equilibrium, as a void may start in contact.
+
+    Returns:
+        the smallest eigenvalue there, negative if there is none; and the kind of the way.
+    """
+    _scatter(mode)
+    end = SMOOTH
+    if not correct(motion, relative, absolute, True, system, work, counts):
+        return -1.0, end
+    if not factorise_tangent(motion, system, work, 0.0, counts):
+        factorise_shifted(motion, system, work, counts)
+        share, end = _leave(
+            motion, motion[system.held], 0.0, mode, sense, np.inf, drag, relative, absolute,
+            system, work, counts,
+        )  # fmt: skip
+        if share < 0.0:
+            return -1.0, end
+    return lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE), end
+
+
+@compiled
 def follow(
     loads: Floats, known: int, bends: Floats, trusted: Ints, leaves: bool, sense: float,
     system: System, work: Workspace, relative: float, absolute: float, drag: Floats, branch: Branch,
@@ -341,20 +366,11 @@ def follow(
     """
     motion, step = np.zeros(len(system.mass)), np.empty(len(system.mass))
     mode = np.empty(len(system.dofs))
-    _scatter(mode)
-    # rest itself may be out of balance: a void may start in contact
-    if not correct(motion, relative, absolute, True, system, work, counts):
+    first, end = _come_to_rest(motion, mode, sense, drag, relative, absolute, system, work, counts)
+    if first < 0.0:
         return 0, 0.0
-    if not factorise_tangent(motion, system, work, 0.0, counts):
-        factorise_shifted(motion, system, work, counts)
-        share, branch.jumped[0] = _leave(
-            motion, motion[system.held], 0.0, mode, sense, np.inf, drag, relative, absolute,
-            system, work, counts,
-        )  # fmt: skip
-        branch.snapped[0] = branch.snaps[0] = 0.0
-        if share < 0.0:
-            return 0, 0.0
-    first = lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE)
+    if known == 0 and end != SMOOTH:
+        branch.jumped[0], branch.snapped[0], branch.snaps[0] = end, 0.0, 0.0
     pace = np.array([1.0, first, 0.0, first])
     if known > 0:
         motion[:] = branch.states[known - 1]
