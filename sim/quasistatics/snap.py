@@ -18,13 +18,9 @@ from sim.quasistatics.newton import (
     solve_free,
 )
 
-GAMMA = 0.43586652150845899942
-STAGE_2 = -1.0156171083877702092
-STAGE_3 = (4.0759956452537699825, 9.2076794298330791242)
-STEP = (1.0, 6.1697947043828245593, -0.42772256543218573326)
-ERROR = (0.5, -2.9079558716805469822, 0.22354069897811569627)
-"""Of the Rosenbrock method ROS3, L-stable, of third order with an embedded one of second (Sandu et
-al. 1997, Atmos. Environ. 31, 3459), in the form without products of the tangent."""
+GAMMA = 1.0 + np.sqrt(0.5)
+"""Of the Rosenbrock method ROS2, L-stable and without overshoot of stiff contacts (Verwer et al.
+1999, SIAM J. Sci. Comput. 20, 1456)."""
 FLOW_ERROR = 3e-3
 """Local error of a step of the damped motion, mm."""
 AT_REST = 0.02
@@ -92,14 +88,14 @@ def relax(
     near = AT_REST
     gradient(motion, system, work.kinematics, work.force)
     for _ in range(MAX_STEPS):
-        if not damped_step(motion, drag, h, system, work, counts):
+        if not _ros2(motion, drag, h, system, work, counts):
             h *= 0.25
             continue
-        # work.product: the step of third order; work.guess: its difference from one of second
+        # work.product: the step of second order; work.guess: its difference from one of first
         error, moved = _largest(work.guess, system), _largest(work.product, system)
         allowed = KEEP_FROM_BARRIER * admissible_step(motion, system, work.product)
         work.trial[:] = motion + work.product
-        longer = 0.8 * (FLOW_ERROR / max(error, 1e-300)) ** (1.0 / 3.0)
+        longer = 0.8 * np.sqrt(FLOW_ERROR / max(error, 1e-300))
         if error > FLOW_ERROR or allowed < 1.0:
             h *= min(0.5, max(0.2, longer))
             continue
@@ -128,13 +124,13 @@ def _largest(step: Floats, system: System) -> float:
 
 
 @compiled
-def damped_step(
+def _ros2(
     motion: Floats, drag: Floats, h: float, system: System, work: Workspace, counts: Ints
 ) -> bool:
     """Fills ``work.product`` with a step of the damped motion; False if it is too long for that.
 
     The workspace holds gradient and kinematics at ``motion``; ``work.guess`` is filled with the
-    difference from the step of second order.
+    difference from the step of first order.
     """
     counts[FACTORS] += 1
     clear(work.matrix)
@@ -143,27 +139,19 @@ def damped_step(
         add(work.matrix, i, i, drag[system.dofs[i]] / (GAMMA * h))
     if not factorise(work.matrix):
         return False
-    # (K + C / (gamma h)) d1 = -g(q)
+    # (K + C / (gamma h)) d1 = -g(q) / gamma
     solve_free(system, work)
-    work.product[:] = work.step
+    work.product[:] = work.step / GAMMA
     work.trial[:] = motion + work.product
     if KEEP_FROM_BARRIER * admissible_step(motion, system, work.product) < 1.0:
         gradient(motion, system, work.kinematics, work.force)
         return False
     gradient(work.trial, system, work.kinematics, work.force)
-    # (K + C / (gamma h)) d2 = -g(q + d1) + C c21 d1 / h
+    # (K + C / (gamma h)) d2 = -g(q + d1) / gamma - 2 C d1 / (gamma h)
     for d in system.dofs:
-        work.force[d] -= drag[d] * STAGE_2 * work.product[d] / h
+        work.force[d] = (work.force[d] + 2.0 * drag[d] * work.product[d] / h) / GAMMA
     solve_free(system, work)
-    work.guess[:] = work.step
-    # (K + C / (gamma h)) d3 = -g(q + d1) + C (c31 d1 + c32 d2) / h
-    for d in system.dofs:
-        more = (STAGE_3[0] - STAGE_2) * work.product[d] + STAGE_3[1] * work.guess[d]
-        work.force[d] -= drag[d] * more / h
-    solve_free(system, work)
-    for d in system.dofs:
-        d1, d2, d3 = work.product[d], work.guess[d], work.step[d]
-        work.product[d] = STEP[0] * d1 + STEP[1] * d2 + STEP[2] * d3
-        work.guess[d] = ERROR[0] * d1 + ERROR[1] * d2 + ERROR[2] * d3
+    work.guess[:] = 0.5 * (work.product + work.step)
+    work.product[:] = work.product + work.guess
     gradient(motion, system, work.kinematics, work.force)
     return True

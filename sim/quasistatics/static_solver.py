@@ -57,6 +57,9 @@ class StaticSolver:
     substeps: int = 1  # loads to pass on the way to each output load, that one included
     sense: float = 1.0  # in which the critical mode of a branching is followed: 1 or -1
     leaves: bool = True  # a path that ends, by a snap; else states from there on are not a number
+    # from the load before, where units meet for which the tangent has no room; else from rest: by
+    # other last bits an optimisation goes another way
+    continues: bool = False
 
     def refined(self, record: StaticRecord) -> StaticSolver:
         """Passes twice the loads, each to a hundred times tighter a tolerance."""
@@ -79,11 +82,12 @@ class StaticSolver:
         system = system_of(top, values)
         check_start(top, values, system.contacts, np.zeros(top.n_dofs))
         reached, fraction = self._follow(values, loads, 0, top, system, branch, counts)
-        while len(met := new_pairs(system.contacts)) > 0:  # goes on from the last load
+        while self.continues and len(met := new_pairs(system.contacts)) > 0:
             top = top.coupling(met)
             system = system_of(top, values)
             _forget(branch, reached)
             reached, fraction = self._follow(values, loads, reached, top, system, branch, counts)
+        raise_new_pairs(system.contacts)
         if reached < len(loads):
             if self.leaves or not branch.jumped[reached]:
                 raise self._ended(values, branch.states[: reached + 1], fraction)

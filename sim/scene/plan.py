@@ -78,7 +78,8 @@ def make_plan(
         times: (n_times,) of the output, s; None for the loss's own samples.
         threads: cases to solve side by side.
         every_case: whether the motion of each load case is wanted, and not its loss alone.
-        gradient: whether derivatives are wanted; without, stages are solved as motions need it.
+        gradient: whether derivatives are wanted; without, stages are solved as motions need it, and
+            a path goes on where units meet.
 
     Raises:
         SimulationError: nothing can move, or nothing acts on what does.
@@ -107,7 +108,7 @@ def make_plan(
     solver: Solver
     if scene.loads.static:
         integrator: Literal["static", "implicit", "explicit"] = "static"
-        solver = StaticSolver(scene.topology, times, threads=threads)
+        solver = StaticSolver(scene.topology, times, threads=threads, continues=not gradient)
         decisions.append(f"tangent: {scene.topology.numbering[1].describe()}")
         skipped.append("inertia and damping: the scene is static")
     else:

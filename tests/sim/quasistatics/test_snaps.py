@@ -8,7 +8,6 @@ from scipy.optimize import brentq
 from sim.core import Floats
 from sim.energy import Topology, gradient, system_of, workspace
 from sim.quasistatics import BRANCHING, LIMIT_POINT, StaticSolver
-from sim.quasistatics.snap import damped_step
 from sim.solvers import LinearRamp, TimeSeries
 from sim.structure import ConcreteParameters, quads
 from sim.vibration import linearised
@@ -148,32 +147,6 @@ def test_a_snap_ends_where_damped_motion_comes_to_rest() -> None:
 
     found = solve_ivp(rate, (0.0, 1e4), before[free], method="BDF", rtol=1e-6, atol=1e-8)
     np.testing.assert_allclose(found.y[:, -1], after[free], rtol=0, atol=1e-5)
-
-
-def test_a_step_of_the_damped_motion_is_of_third_order() -> None:
-    """Locally: an error by the fourth power of the step, and its estimate by the third."""
-    rig = squeezed(9.0)
-    system, counts = system_of(rig.topology, rig.values), np.zeros(4, dtype=np.int64)
-    work, drag = workspace(system), rig.topology.scale**2
-    start = StaticSolver(rig.topology, np.ones(1)).forward(rig.values, rig.drive)[0][0]
-    start[system.dofs] *= 0.9
-
-    def moved(h: float, steps: int) -> tuple[Floats, float]:
-        motion, estimate = start.copy(), 0.0
-        for _ in range(steps):
-            gradient(motion, system, work.kinematics, work.force)
-            assert damped_step(motion, drag, h / steps, system, work, counts)
-            estimate = float(np.abs(work.guess[system.dofs]).max())
-            motion += work.product
-        return motion, estimate
-
-    errors, estimates = [], []
-    for h in (2e-4, 1e-4):
-        once, estimate = moved(h, 1)
-        errors.append(np.abs(once - moved(h, 32)[0]).max())
-        estimates.append(estimate)
-    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.2)
-    assert estimates[0] / estimates[1] == pytest.approx(8.0, rel=0.2)
 
 
 def test_the_eigenvalue_of_every_load_is_that_of_the_dense_tangent() -> None:
