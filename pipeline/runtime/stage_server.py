@@ -220,12 +220,12 @@ def _become(request: _Request, given: list[int]) -> None:
 
 
 def serve(path: Path, listener: int, life: int) -> None:
-    """Serves requests at the socket `path`; returns in the server at its end, in a fork never."""
+    """Serves requests at the socket `path`; returns at its end, or its program's in a fork."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     request = _Server(socket.socket(fileno=listener), life).serve()
     if request is not None:
         runpy.run_module(request.program, run_name="__main__", alter_sys=True)
-        cli.leave(0)
+        return
     path.unlink(missing_ok=True)
     path.parent.rmdir()
 

@@ -348,34 +348,40 @@ def _come_to_rest(
 
 @compiled
 def follow(
-    loads: Floats, known: int, bends: Floats, trusted: Ints, leaves: bool, sense: float,
-    system: System, work: Workspace, relative: float, absolute: float, drag: Floats, branch: Branch,
-    counts: Ints,
+    loads: Floats, known: int, pace: Floats, bends: Floats, trusted: Ints, leaves: bool,
+    sense: float, system: System, work: Workspace, relative: float, absolute: float, drag: Floats,
+    branch: Branch, counts: Ints,
 ) -> tuple[int, float]:  # fmt: skip
     """Fills a branch with the equilibria at ``loads`` (n_loads, n_held), the first `known` kept.
 
-    `bends` (n_loads, n_dofs) is by how much the path of a similar structure departs from its
-    tangent between two loads, to be tried first where `trusted` (n_loads,). Where the path ends,
-    the structure `leaves` it, or the branch ends as well. The critical mode of a branching is
-    followed in the `sense` 1 or -1. `work` is room for the states. The residual's tolerance is
-    relative to the largest reaction, its floor `absolute` in N; `drag` (n_dofs,) is that of the
-    damped motion after a snap; `counts` (4,) gathers the work.
+    `pace` (4,), see ``INCREMENT``, is that with which these were found. `bends` (n_loads, n_dofs)
+    is by how much the path of a similar structure departs from its tangent between two loads, to be
+    tried first where `trusted` (n_loads,). Where the path ends, the structure `leaves` it, or the
+    branch ends as well. The critical mode of a branching is followed in the `sense` 1 or -1. `work`
+    is room for the states. The residual's tolerance is relative to the largest reaction, its floor
+    `absolute` in N; `drag` (n_dofs,) is that of the damped motion after a snap; `counts` (4,)
+    gathers the work.
 
     Returns:
         the number of loads reached, and the fraction of the way to the next.
     """
     motion, step = np.zeros(len(system.mass)), np.empty(len(system.mass))
     mode = np.empty(len(system.dofs))
-    first, end = _come_to_rest(motion, mode, sense, drag, relative, absolute, system, work, counts)
-    if first < 0.0:
-        return 0, 0.0
-    if known == 0 and end != SMOOTH:
-        branch.jumped[0], branch.snapped[0], branch.snaps[0] = end, 0.0, 0.0
-    pace = np.array([1.0, first, 0.0, first])
-    if known > 0:
+    if known == 0:
+        first, end = _come_to_rest(
+            motion, mode, sense, drag, relative, absolute, system, work, counts
+        )
+        if first < 0.0:
+            return 0, 0.0
+        if end != SMOOTH:
+            branch.jumped[0], branch.snapped[0], branch.snaps[0] = end, 0.0, 0.0
+        pace[VALUE] = pace[FIRST] = first
+    else:
         motion[:] = branch.states[known - 1]
         factorise_tangent(motion, system, work, 0.0, counts)
+        _scatter(mode)
         pace[VALUE] = lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE)
+    pace[INCREMENT], pace[RATE] = 1.0, 0.0
     for p in range(known, len(loads)):
         done = 0.0
         _towards(motion, loads[p], 1.0, system, work)
