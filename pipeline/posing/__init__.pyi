@@ -12,6 +12,7 @@ from .case_result import measure as measure
 from .case_result import structures_of as structures_of
 from .case_result import times_of as times_of
 from .dispersion import compute_bands as compute_bands
+from .failures import StoppedError as StoppedError
 from .first_look import SOFT as SOFT
 from .first_look import compliance_shares as compliance_shares
 from .first_look import cost_line as cost_line

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,34 +54,42 @@ def unconfirmed(error: UnconfirmedError, asked: Problem, source: Path) -> UserEr
     return UserError(str(error), file=source, key="horizon.steps", remedy=remedy)
 
 
-class SimulatedStructure(NamedTuple):
-    """Names what was to be simulated: a structure of a problem file at times (n_times,)."""
+class StoppedError(Exception):
+    """Tells that a structure's motion could not be followed to its end.
 
-    source: Path
-    scene: Scene
-    name: str
-    asked: NDArray[np.float64]
+    Attributes:
+        error: why.
+        scene: what was simulated.
+        name: of the structure.
+        asked: (n_times,) times that were asked for, s.
+    """
 
+    def __init__(
+        self, error: SimulationError, scene: Scene, name: str, asked: NDArray[np.float64]
+    ) -> None:
+        super().__init__(str(error))
+        self.error, self.scene, self.name, self.asked = error, scene, name, asked
 
-def simulation_failure(
-    error: SimulationError, tried: SimulatedStructure, kept: Path | None
-) -> UserError:
-    """Explains that a structure's motion could not be followed to its end; `kept` has what was."""
-    scene = tried.scene
-    what = f"the {tried.name} structure cannot be simulated"
-    if scene.loads.static and error.step is not None:
-        reached = 0.0 if error.step == 0 else float(tried.asked[error.step - 1])
-        share = f"{reached / scene.loads.duration:.0%} of the load"
-        if any(case.control is not None for case in scene.loads.cases):
-            what += f" beyond {share}"
-        else:
-            driven = [np.asarray(law(np.array([reached])))[..., :2] for law in scene.loads.motions]
-            length = max(float(np.linalg.norm(each, axis=-1).max()) for each in driven)
-            what += f" beyond a driven displacement of {length:.3g} mm ({share})"
-    if error.unit is not None:
-        i, j = scene.lattice.index[error.unit]
-        what += f", look at unit [{i}, {j}]"
-    remedy = "lower drive.amplitude, or ask for solver.accuracy: tight"
-    if kept is not None:
-        remedy += f"; all up to there is in {kept}"
-    return UserError(f"{what}: {error}", file=tried.source, key="drive.amplitude", remedy=remedy)
+    def explain(self, source: Path, kept: Path | None = None) -> UserError:
+        """Explains it to the user of a problem file; the dataset `kept` has what was reached."""
+        remedy = "lower drive.amplitude, or ask for solver.accuracy: tight"
+        if kept is not None:
+            remedy += f"; all up to there is in {kept}"
+        what = f"the {self.name} structure cannot be simulated{self._place()}: {self.error}"
+        return UserError(what, file=source, key="drive.amplitude", remedy=remedy)
+
+    def _place(self) -> str:
+        """Describes up to which load it was followed, and where to look."""
+        scene, error, place = self.scene, self.error, ""
+        if scene.loads.static and error.step is not None:
+            reached = 0.0 if error.step == 0 else float(self.asked[error.step - 1])
+            place = f"{reached / scene.loads.duration:.0%} of the load"
+            if all(case.control is None for case in scene.loads.cases):
+                laws = [np.asarray(law(np.array([reached]))) for law in scene.loads.motions]
+                length = max(float(np.linalg.norm(law[..., :2], axis=-1).max()) for law in laws)
+                place = f"a driven displacement of {length:.3g} mm ({place})"
+            place = f" beyond {place}"
+        if error.unit is not None:
+            i, j = scene.lattice.index[error.unit]
+            place += f", look at unit [{i}, {j}]"
+        return place

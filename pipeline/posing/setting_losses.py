@@ -12,7 +12,7 @@ from pipeline.posing.case_result import PosedStructure, structures_of
 from pipeline.posing.to_scene import lattice_of, scene_of
 from pipeline.problem import Problem, canonical_json, from_canonical
 from pipeline.problem.reading import find_faults, first_fault
-from pipeline.problem.sections import Setting, apply_setting
+from pipeline.problem.sections import Setting, SettingError, apply_setting
 from pipeline.runtime import SweepResult, UserError
 from sim.core import Floats, SimulationError
 from sim.scene import cases_of, make_plan, mimicking, target_motion
@@ -35,7 +35,7 @@ def results(
         SimulationError: what the structures should mimic cannot be simulated.
     """
     try:
-        problem = _posed(asked, setting)
+        problem = posed(asked, setting)
         if lattice_of(problem).n_units != design.sizes["unit"]:
             raise UnposedError("the design is of a lattice with another number of units")
         # No design space is asked for: its symmetry costs more than it could save.
@@ -44,6 +44,8 @@ def results(
         raise UnposedError(first_fault(error)[0]) from error
     except UserError as error:
         raise UnposedError(error.what) from error
+    except SettingError as error:
+        raise UnposedError(str(error)) from error
     target = None if scene.objective.reference is None else target_motion(scene, threads)
     structures = structures_of(scene, design)
     altered, cloaked = (
@@ -60,10 +62,13 @@ def mean(found: list[SweepResult], weights: Floats) -> SweepResult:
     return SweepResult(float(loss), float(altered), float(numbers[:, 2].min()), status)
 
 
-def _posed(asked: Problem, setting: Setting) -> Problem:
+def posed(asked: Problem, setting: Setting) -> Problem:
     """Lays a setting over a problem's own values, and drops the sweep."""
-    data = apply_setting(json.loads(canonical_json(asked, "sweep")), setting)
-    data.pop("sweep")
+    data = json.loads(canonical_json(asked, "sweep"))
+    if any(key.startswith("material.foil") for key in setting):
+        data.get("fabrication", {}).get("shims", {}).pop("thickness", None)  # follows from the foil
+    data = apply_setting(data, setting)
+    data.pop("sweep", None)
     problem = from_canonical(data)
     for finding in find_faults(problem):
         raise UnposedError(f"{'.'.join(map(str, finding.keys))}: {finding.what}")

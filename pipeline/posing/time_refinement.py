@@ -16,6 +16,7 @@ from pipeline.posing.case_result import (
     structures_of,
     times_of,
 )
+from pipeline.posing.failures import StoppedError
 from pipeline.posing.to_scene import scene_of
 from pipeline.posing.verification import AS_RUN, CheckResult
 from sim.core import Floats, SimulationError
@@ -25,6 +26,8 @@ from sim.structure import clearance
 from sim.time_integration import ExplicitRecord
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import xarray as xr
 
     from pipeline.problem import Problem
@@ -47,31 +50,43 @@ def trials(
     """Collects numbers by check and structure, and by check whether there are any or why not.
 
     Raises:
-        SimulationError: a structure cannot be simulated as it was run.
+        StoppedError: a structure cannot be simulated as it was run.
     """
     structures = structures_of(scene_of(asked, folder), design)
     times = times_of(asked, structures["altered"].scene)
-    runs = as_run = {name: _first(each, times) for name, each in structures.items()}
+    runs = as_run = _as_posed(structures, times)
     found = {AS_RUN: _numbers(structures, runs, as_run, times)}
     status = {AS_RUN: "ok"}
-    for check in (name for name, halvings in HALVINGS.items() if halvings):
-        runs = {name: run.refined() for name, run in runs.items()}
+    halved = [name for name, halvings in HALVINGS.items() if halvings]
+    for place, check in enumerate(halved):
+        try:
+            runs = {name: run.refined() for name, run in runs.items()}
+        except SimulationError as error:
+            LOG.warning("%s: %s", check, error)
+            status |= dict.fromkeys(halved[place:], str(error))  # shorter steps start from these
+            break
         found[check] = _numbers(structures, runs, as_run, times)
         status[check] = "ok"
     law, check = OTHER_LAW[asked.contact.law]
     others = structures_of(scene_of(law_comparison.under(asked, law), folder), design)
     try:
-        runs = {name: _first(each, times) for name, each in others.items()}
-        found[check] = _numbers(others, runs, as_run, times)
+        found[check] = _numbers(others, _as_posed(others, times), as_run, times)
         status[check] = "ok"
-    except SimulationError as error:
-        LOG.warning("%s: %s", check, error)
-        status[check] = str(error)
+    except StoppedError as stopped:
+        LOG.warning("%s: %s", check, stopped)
+        status[check] = str(stopped)
     return found, status
 
 
-def _first(structure: PosedStructure, times: Times) -> Response:
-    return simulate(structure.scene, vertices=structure.vertices, times=times.asked)
+def _as_posed(structures: Mapping[str, PosedStructure], times: Times) -> Runs:
+    """Simulates structures with the steps that the solver takes by itself."""
+    runs: Runs = {}
+    for name, (scene, vertices) in structures.items():
+        try:
+            runs[name] = simulate(scene, vertices=vertices, times=times.asked)
+        except SimulationError as error:
+            raise StoppedError(error, scene, name, times.asked) from error
+    return runs
 
 
 def _time_step(run: Response) -> float:

@@ -49,6 +49,8 @@ _DIMENSIONS = {
 def over_measured_constants(asked: Problem, folder: Path) -> Problem:
     """Replaces the sweep of a problem by one over the measured constants that its report names.
 
+    They take the place of those that follow from a foil.
+
     Raises:
         UserError: the file cannot be used, or has fewer draws than are asked for.
     """
@@ -68,4 +70,6 @@ def over_measured_constants(asked: Problem, folder: Path) -> Problem:
         )
         for k, (name, dimension) in enumerate(_DIMENSIONS.items())
     }
-    return asked.model_copy(update={"sweep": Sweep.model_validate({"list": listed})})
+    material = asked.material.model_copy(update={"foil": None})
+    sweep = Sweep.model_validate({"list": listed})
+    return asked.model_copy(update={"material": material, "sweep": sweep})

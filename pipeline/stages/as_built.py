@@ -9,9 +9,15 @@ from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.fabrication.parts import STRAIGHT, UnbuildableUnitError
 from pipeline.fabrication.units import end_angles, network
-from pipeline.posing import BENT, PosedStructure, failures, read_design, scene_of, structures_of
-from pipeline.runtime import UserError
-from pipeline.stages.simulate import StoppedError, response_dataset
+from pipeline.posing import (
+    BENT,
+    PosedStructure,
+    StoppedError,
+    read_design,
+    scene_of,
+    structures_of,
+)
+from pipeline.stages.simulate import response_dataset
 from sim.core import Floats, SimulationError
 from sim.scene import relaxed
 
@@ -39,26 +45,15 @@ def work(args: argparse.Namespace) -> None:
         error.remedy = f"{error.remedy}, {_REMEDY}"
         raise
     except SimulationError as error:
-        raise _failure(error, name, posed, args, np.zeros(0)) from error
+        stopped = StoppedError(error, posed[name].scene, f"{name} (as built)", np.zeros(0))
+        raise stopped.explain(args.problem) from error
     except StoppedError as stopped:
-        raise _failure(stopped.error, stopped.name, posed, args, stopped.asked) from stopped
+        stopped.name = f"{stopped.name} (as built)"
+        raise stopped.explain(args.problem) from stopped
     for name, each in angles.items():
         plans[name]["warnings"] += bent_warning(name, each)
     origin = provenance.of_study(asked, "as_built", parents={"design": args.design}, plan=plans)
     datasets.write(made, args.out, "response", origin)
-
-
-def _failure(
-    error: SimulationError,
-    name: str,
-    posed: dict[str, PosedStructure],
-    args: argparse.Namespace,
-    asked: Floats,
-) -> UserError:
-    """Explains that a structure as built has no equilibrium at rest or under a load."""
-    scene = posed[name].scene
-    tried = failures.SimulatedStructure(args.problem, scene, f"{name} (as built)", asked)
-    return failures.simulation_failure(error, tried, None)
 
 
 def bent_warning(name: str, angles: Floats) -> list[str]:

@@ -185,8 +185,8 @@ def optimise(
         except UnconfirmedError as error:
             raise failures.unconfirmed(error, asked, source) from error
         except SimulationError as error:
-            tried = failures.SimulatedStructure(source, scene, "initial", plan.solver.output_times)
-            raise failures.simulation_failure(error, tried, None) from error
+            stopped = failures.StoppedError(error, scene, "initial", plan.solver.output_times)
+            raise stopped.explain(source) from error
         except JournalInUseError as error:
             raise UserError(str(error), file=source) from error
 

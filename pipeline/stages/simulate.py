@@ -12,9 +12,9 @@ from pipeline.datasets import provenance
 from pipeline.posing import (
     CaseResult,
     PosedStructure,
+    StoppedError,
     Times,
     assemble_response,
-    failures,
     law_comparison,
     measure,
     read_design,
@@ -25,7 +25,7 @@ from pipeline.posing import (
 )
 from pipeline.problem import Problem
 from pipeline.runtime import cli
-from sim.core import Floats, SimulationError
+from sim.core import SimulationError
 from sim.scene import Scene, cases_of, make_plan
 from sim.solvers import run_batch
 
@@ -51,19 +51,9 @@ def work(args: argparse.Namespace) -> None:
         made, plans = response_dataset(asked, structures, args.threads)
     except StoppedError as stopped:
         kept = _keep(asked, structures, stopped, args)
-        scene = structures[stopped.name].scene
-        tried = failures.SimulatedStructure(args.problem, scene, stopped.name, stopped.asked)
-        raise failures.simulation_failure(stopped.error, tried, kept) from stopped
+        raise stopped.explain(args.problem, kept) from stopped
     origin = provenance.of_study(asked, "simulate", parents=parents, plan=plans)
     datasets.write(made, args.out, "response", origin)
-
-
-class StoppedError(Exception):
-    """A structure whose motion could not be followed to its end."""
-
-    def __init__(self, name: str, error: SimulationError, asked: Floats) -> None:
-        super().__init__(name)
-        self.name, self.error, self.asked = name, error, asked
 
 
 def _keep(
@@ -73,7 +63,7 @@ def _keep(
     args: argparse.Namespace,
 ) -> Path | None:
     """Writes the response of a static path as far as all structures can be followed, if at all."""
-    scene, step = structures[stopped.name].scene, stopped.error.step
+    scene, step = stopped.scene, stopped.error.step
     if not scene.loads.static or scene.objective.steps is None or not step:
         return None  # a step in time is the solver's own, of no use to others
     reached = stopped.asked[step - 1] / scene.loads.duration
@@ -122,14 +112,17 @@ def measured_cases(
     """Every case of every structure, and the plan of each structure.
 
     Raises:
-        UserError: a structure cannot be simulated.
+        StoppedError: a structure cannot be simulated, or not be followed to its end.
     """
     measured: dict[str, list[CaseResult]] = {}
     plans: dict[str, dict[str, Any]] = {}
     n_cases = len(structures["altered"].scene.loads.motions)
     with cli.progress(len(structures) * n_cases, "response") as bar:
         for name, structure in structures.items():
-            plan = make_plan(structure.scene, structure.vertices, times.asked, every_case=True)
+            try:
+                plan = make_plan(structure.scene, structure.vertices, times.asked, every_case=True)
+            except SimulationError as error:
+                raise StoppedError(error, structure.scene, name, times.asked) from error
             plans[name] = plan.record()
             LOG.info("%s: %s", name, plan.describe())
             cases = cases_of(structure.scene, structure.vertices, plan.solver)
@@ -138,7 +131,7 @@ def measured_cases(
             for outcome in run_batch(cases, reduce, threads):
                 if outcome.value is None:
                     assert outcome.error is not None
-                    raise StoppedError(name, outcome.error, times.asked)
+                    raise StoppedError(outcome.error, structure.scene, name, times.asked)
                 measured[name].append(outcome.value)
                 bar.update(loss=outcome.value.loss)
     return measured, plans

@@ -94,7 +94,7 @@ def _results(
         found = setting_losses.results(asked, setting, args.problem.parent, design, args.threads)
     except (setting_losses.UnposedError, SimulationError) as error:
         return [SweepResult.failed(str(error))] * len(group.numbers)
-    if sweep_cases.DIRECTIONS in setting:
+    if sweep_cases.names_directions(setting):
         return found
     return [setting_losses.mean(found, np.array(asked.drive.case_weights))]
 

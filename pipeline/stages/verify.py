@@ -14,6 +14,7 @@ from pipeline.posing import (
     UNSTABLE,
     CaseResult,
     CheckResult,
+    StoppedError,
     assemble_verification,
     loss_units,
     read_design,
@@ -42,7 +43,10 @@ def work(args: argparse.Namespace) -> None:
         remedy = "give horizon.steps, or leave the check out"
         raise UserError(what, file=args.problem, key="horizon.steps", remedy=remedy)
     design = read_design(asked, args.design)
-    made = checks(asked, args.problem.parent, design, args.threads)
+    try:
+        made = checks(asked, args.problem.parent, design, args.threads)
+    except StoppedError as stopped:
+        raise stopped.explain(args.problem) from stopped
     origin = provenance.of_study(asked, "verify", parents={"design": args.design})
     datasets.write(made, args.out, "verification", origin)
 
@@ -66,7 +70,11 @@ def variants(asked: Problem) -> dict[str, Problem]:
 
 
 def checks(asked: Problem, folder: Path, design: xr.Dataset, threads: int = 1) -> xr.Dataset:
-    """The dataset ``verification``; a variant that cannot be simulated keeps its reason."""
+    """The dataset ``verification``; a variant that cannot be simulated keeps its reason.
+
+    Raises:
+        StoppedError: a structure cannot be simulated as it was run.
+    """
     found, status = (
         _finer_loads(asked, folder, design, threads)
         if asked.static
@@ -89,11 +97,11 @@ def _finer_loads(
         times = times_of(variant, structures["altered"].scene)
         try:
             tables[name], _ = measured_cases(structures, times, threads)
-        except UserError as error:
+        except StoppedError as stopped:
             if name == AS_RUN:
                 raise
-            LOG.warning("%s: %s", name, error.what)
-            status[name] = error.what
+            LOG.warning("%s: %s", name, stopped)
+            status[name] = str(stopped)
     as_run = tables[AS_RUN]
     found = {
         name: {

@@ -61,6 +61,9 @@ def load(path: str | Path, preset: str | None = None) -> Problem:
     return _with_recording(problem, document)
 
 
+_KEYS = "name a key with those above it, joined by dots: drive.frequency, drives.0.amplitude"
+
+
 def _design(document: Document, data: Mapping[str, Any], number: int) -> dict[str, Any]:
     try:
         return designs.select_design(data, number)
@@ -68,6 +71,8 @@ def _design(document: Document, data: Mapping[str, Any], number: int) -> dict[st
         count = designs.design_count(data)
         remedy = f"give one from 1 to {count}" if count else "name a preset, or none"
         raise UserError(str(error), file=document.path, key="designs", remedy=remedy) from error
+    except sweep_cases.SettingError as error:
+        raise UserError(str(error), file=document.path, key="designs", remedy=_KEYS) from error
 
 
 def _check_sweep(
@@ -76,14 +81,16 @@ def _check_sweep(
     """Tries the first value of every parameter that a sweep sets, one at a time."""
     first = next(sweep_cases.list_settings(sweep))
     for key, word in first.items():
+        place = ("sweep", sweep.form, key)
         try:
             Problem.model_validate(
                 sweep_cases.apply_setting(data, {key: word}), context={FOLDER: document.path.parent}
             )
         except ValidationError as error:
             what, remedy = first_fault(error)
-            place = ("sweep", sweep.form, key)
             raise _user_error(document, preset, data, place, what, remedy) from error
+        except sweep_cases.SettingError as error:
+            raise _user_error(document, preset, data, place, str(error), _KEYS) from error
 
 
 def overlay_keys(base: Mapping[str, Any], overlay: Mapping[str, Any]) -> dict[str, Any]:

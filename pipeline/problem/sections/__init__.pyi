@@ -66,6 +66,7 @@ from .sweep import write_quantity as write_quantity
 from .sweep_cases import DIRECTIONS as DIRECTIONS
 from .sweep_cases import DirectionGroup as DirectionGroup
 from .sweep_cases import Setting as Setting
+from .sweep_cases import SettingError as SettingError
 from .sweep_cases import apply_setting as apply_setting
 from .sweep_cases import case_count as case_count
 from .sweep_cases import group_count as group_count

@@ -96,19 +96,60 @@ def parameter_unit(sweep: Sweep, key: str) -> str:
     return (first and first[1]) or "1"
 
 
-def apply_setting(data: Mapping[str, Any], setting: Setting) -> dict[str, Any]:
-    """Lays a setting over the content of a problem file.
+class SettingError(ValueError):
+    """Refuses a key that leads to nothing a value could be set at."""
 
-    A single value at a key that holds a list is a list of one; new directions weigh equally.
+
+def apply_setting(data: Mapping[str, Any], setting: Setting) -> dict[str, Any]:
+    """Lays a setting over the content of a problem file, as read or in its canonical form.
+
+    A single value at a key that holds a list is a list of one, and items of lists are named by
+    their number from 0: `drives.0.amplitude`. New directions weigh equally.
+
+    Raises:
+        SettingError: there is no section above a key.
     """
     made = copy.deepcopy(dict(data))
     for key, value in setting.items():
-        *above, last = key.split(".")
-        section = made
-        for name in above:
-            section = section.setdefault(name, {})
-        several = isinstance(section.get(last), list)
-        section[last] = [value] if several and not isinstance(value, list) else value
-        if key == DIRECTIONS:
-            section.pop("weights", None)
+        *above, last = _canonical(key, made).split(".")
+        section = _section(made, above, key)
+        if last in _DIRECTIONS:
+            for name in (*_DIRECTIONS, "weights"):
+                section.pop(name, None)
+            section["directions"] = value if isinstance(value, list) else [value]
+        else:
+            several = isinstance(section.get(last), list) and not isinstance(value, list)
+            section[last] = [value] if several else value
     return made
+
+
+def names_directions(setting: Setting) -> bool:
+    """Tells whether a setting gives the drive's directions, each a load case of its own."""
+    return not {f"drive.{name}" for name in _DIRECTIONS}.isdisjoint(setting)
+
+
+_DIRECTIONS = ("directions", "direction")
+"""The key of a drive's directions, and that of a single one, which stands for a list of one."""
+
+
+def _canonical(key: str, data: Mapping[str, Any]) -> str:
+    """Names a key below several drives as the canonical form has it, where that is given."""
+    several = key.startswith("drives.") and "drives" not in data and "drive" in data
+    return f"drive.{key}" if several else key
+
+
+def _section(data: dict[str, Any], above: list[str], key: str) -> dict[str, Any]:
+    """Finds the section that holds a key, and makes those that a file leaves out."""
+    section: Any = data
+    for name in above:
+        if isinstance(section, list):
+            if not name.isdigit() or int(name) >= len(section):
+                raise SettingError(f"{key}: {name!r} is no item of a list of {len(section)}")
+            section = section[int(name)]
+        else:
+            section = section.setdefault(name, {})
+        if not isinstance(section, dict | list):
+            raise SettingError(f"{key}: {name!r} holds a value, and no keys")
+    if isinstance(section, list):
+        raise SettingError(f"{key}: {above[-1]!r} holds a list; name an item by its number from 0")
+    return section

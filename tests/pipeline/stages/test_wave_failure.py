@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.posing import Times
+from pipeline.posing import PosedStructure, StoppedError, Times
 from pipeline.stages import simulate
 from sim.core import SimulationError
 from tests.pipeline.conftest import Failing
@@ -34,9 +34,9 @@ def wave(tmp_path: Path) -> Path:
 def test_a_motion_that_cannot_be_followed_ends_in_one_error(
     wave: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: Failing
 ) -> None:
-    def measured(_: object, times: Times, __: int) -> None:
+    def measured(structures: dict[str, PosedStructure], times: Times, _: int) -> None:
         error = SimulationError("the explicit run is unstable", step=FAR)
-        raise simulate.StoppedError("cloaked", error, times.asked)
+        raise StoppedError(error, structures["cloaked"].scene, "cloaked", times.asked)
 
     monkeypatch.setattr(simulate, "measured_cases", measured)
     words = ["--problem", str(wave), "--quiet", "--out", str(tmp_path / "r.nc")]
