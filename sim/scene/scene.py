@@ -312,8 +312,12 @@ class Scene:
 
     @cached_property
     def topology(self) -> Topology:
-        """Joins the fixed structure; differentiable by what the design can change."""
-        moved = np.unique(self.lattice.unit[self.space.free_vertices])
+        """Joins the fixed structure; differentiable by what the design can change.
+
+        Turned slots move all free units to where the structure rests, and so all ligaments.
+        """
+        space = self.space
+        moved = None if space.turning else np.unique(self.lattice.unit[space.free_vertices])
         loads, contact = self.loads, self.structure.contact
         return topology(self.lattice, loads.held, contact, moved, loads.loaded)
 

@@ -176,6 +176,24 @@ def test_designs_with_turned_slots_are_those_built_and_pass_the_taylor_test(
     np.testing.assert_allclose(orders, 2.0, atol=0.15)
 
 
+def test_turned_slots_move_ligaments_far_from_the_design() -> None:
+    lattice = sim.quads(7, 5, 15.0, 2.25, np.deg2rad(20.0))
+    left = np.arange(0, 35, 7)
+    pull = sim.PrescribedMotion(left + 6, sim.LinearRamp(-1.0, 1.0, 0.0))
+    loads = sim.Loads((pull,), (sim.Clamp(left),), static=True, duration=1.0)
+    posed = sim.Scene(sim.Structure(lattice, PLAIN), loads).updated(
+        region=np.array([18, 19]), steps=2, cloak=np.array([15, 16]), turning_slots=True
+    )
+    rng = np.random.default_rng(4)
+    design, way = rng.normal(size=(2, posed.space.n_variables))
+    plan = sim.make_plan(posed)
+    _, gradient = sim.evaluate(posed, design, plan)
+    orders = taylor_orders(
+        lambda step: sim.evaluate(posed, design + step * way, plan)[0], gradient @ way, STEPS
+    )
+    np.testing.assert_allclose(orders, 2.0, atol=0.15)
+
+
 @pytest.mark.parametrize("symmetry", ["C4", "mirror_x", "mirror_y"])
 def test_slots_turn_as_the_symmetry_asks_for(symmetry: Literal["C4", "mirror_x"]) -> None:
     """A structure with them comes to rest in a state of that symmetry."""
