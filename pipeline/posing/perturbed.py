@@ -1,6 +1,7 @@
 """Imperfect copies of a design: how they are drawn, simulated and measured."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import NamedTuple
 
@@ -73,7 +74,11 @@ def drawn(
     sizes = _sizes(asked, scene.lattice.spacing) if isinstance(asked, Tolerances) else asked
     of = scene.structure
     copy = perturbed_structure(scene.lattice, vertices, of.material, sizes, of.contact, seed)
-    return scene.updated(material=copy.material), copy
+    if sizes.assembly is None:
+        return scene.updated(material=copy.material), copy
+    # ligaments join the units where these were put, which breaks a symmetry
+    put = replace(scene.lattice, vertices=copy.vertices)
+    return scene.updated(material=copy.material, lattice=put, symmetry="none"), copy
 
 
 def _sizes(asked: Tolerances, spacing: float) -> Perturbation:

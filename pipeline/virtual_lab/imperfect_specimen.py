@@ -1,6 +1,5 @@
 """Draws specimens as a lab has them: off their design, and driven as shakers drive."""
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -72,7 +71,6 @@ def make_specimen(
         raise UserError("units of the specimen overlap", key="virtual.specimen", remedy=remedy)
     made = scene.driven_by(
         imperfect_drive(scene, case, asked.drive, end, asked.unload),
-        lattice=replace(scene.lattice, vertices=copy.vertices),
         duration=end,
         frequency=None,
         reference=None,

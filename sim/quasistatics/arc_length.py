@@ -164,7 +164,8 @@ class Tangent:
         """Finds the smallest eigenvalue, or so many negative ones, from zero down; and modes."""
         if self.size < FEW:
             values, modes = np.linalg.eigh(self._stiffness.toarray())
-            return values[:count], modes[:, :count]
+            first = max(self.falling - count, 0)
+            return values[first : first + count], modes[:, first : first + count]
         inverse = spla.LinearOperator(
             (self.size, self.size), matvec=self._factor.solve, dtype=float
         )

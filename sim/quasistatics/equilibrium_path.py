@@ -396,7 +396,9 @@ def follow(
                 motion, loads[p], p, leaves, sense, pace, mode, step, drag, relative, absolute,
                 system, work, branch.snaps, counts,
             )  # fmt: skip
-            branch.jumped[p], branch.snapped[p] = max(kind, branch.jumped[p]), ended
+            branch.jumped[p] = max(kind, branch.jumped[p])
+            if not np.isnan(ended):  # that of coming to rest stays where the way is smooth
+                branch.snapped[p] = ended
         branch.states[p] = motion
         if done < 1.0 or units_met(system.contacts):
             return p, done

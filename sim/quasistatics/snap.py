@@ -94,7 +94,6 @@ def relax(
         # work.product: the step of second order; work.guess: its difference from one of first
         error, moved = _largest(work.guess, system), _largest(work.product, system)
         allowed = KEEP_FROM_BARRIER * admissible_step(motion, system, work.product)
-        work.trial[:] = motion + work.product
         longer = 0.8 * np.sqrt(FLOW_ERROR / max(error, 1e-300))
         if error > FLOW_ERROR or allowed < 1.0:
             h *= min(0.5, max(0.2, longer))

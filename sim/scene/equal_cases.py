@@ -102,8 +102,15 @@ def _keeps_constants(image: NetworkImage, values: ConcreteParameters) -> bool:
         (values.mass[image.unit], values.mass),
         (values.damping[image.unit], values.damping),
     )
-    return np.allclose(
-        values.vector[image.ligament], turned, rtol=0, atol=VERTEX_TOLERANCE
+    # stretch and shear of a ligament are the same from either end, its bend is the opposite
+    ones = np.ones_like(image.reversed)
+    natural = values.natural * np.stack([ones, ones, image.reversed], axis=1)
+    lengths = (
+        (values.vector[image.ligament], turned),
+        (values.natural[image.ligament], natural),
+    )
+    return all(
+        np.allclose(one, other, rtol=0, atol=VERTEX_TOLERANCE) for one, other in lengths
     ) and all(np.allclose(one, other, rtol=SAME, atol=0) for one, other in pairs)
 
 

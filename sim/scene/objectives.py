@@ -60,7 +60,7 @@ class ReactionMimicking(NamedTuple):
     """Adds the relative error of the drive's force to that of the motion.
 
     The force is what the ligaments of the driven units carry to the others: contact on void angles
-    turns units and pushes none.
+    turns units and pushes none. Contact on distance may push driven units, and is not counted.
     """
 
     motion: RelativeMimicking  # error of the motion
@@ -95,6 +95,7 @@ def combined(losses: Numbers, weights: Numbers, sharpness: float) -> Array:
     if sharpness == 1.0:
         return jnp.asarray(weights) @ jnp.asarray(losses)
     largest = jax.lax.stop_gradient(jnp.max(losses))
+    largest = jnp.where(largest > 0.0, largest, 1.0)  # where nothing moves all of them are 0
     return largest * (jnp.asarray(weights) @ (losses / largest) ** sharpness) ** (1.0 / sharpness)
 
 

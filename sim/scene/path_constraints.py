@@ -226,6 +226,7 @@ def _strain_and_slopes(
     def ratio(motion: Array, values: Parameters[Array]) -> Array:
         found = foil_strains(motion[:, ends], values, foil.thickness) / foil.strain
         largest = jax.lax.stop_gradient(jnp.abs(found).max())
+        largest = jnp.where(largest > 0.0, largest, 1.0)  # where nothing moves
         return largest * ((found / largest) ** SHARPNESS).sum() ** (1.0 / SHARPNESS)
 
     return jax.jit(jax.value_and_grad(ratio, argnums=(0, 1)))

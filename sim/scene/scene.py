@@ -47,7 +47,7 @@ def _none() -> Ints:
     return np.zeros(0, dtype=np.int64)
 
 
-def _displaced(case: PrescribedMotion) -> Ints:
+def displaced(case: PrescribedMotion) -> Ints:
     """Ids of the dofs whose displacement or rotation a load case prescribes."""
     dofs = 3 * case.units[:, None] + np.arange(3)
     return dofs.ravel() if case.control is None else dofs[case.control == DISPLACEMENT]
@@ -153,7 +153,7 @@ class Loads:
     @cached_property
     def held(self) -> Ints:
         """(n_held,) ids of all dofs whose motion is prescribed, ascending."""
-        driven = [_displaced(case) for case in self.cases]
+        driven = [displaced(case) for case in self.cases]
         return np.unique(np.concatenate([self.clamped, *driven]))
 
 
@@ -291,8 +291,13 @@ class Scene:
         )
 
     def alone(self, case: int) -> Scene:
-        """Keeps one of the load cases."""
-        return self.updated(cases=(self.loads.cases[case],), weights=None)
+        """Keeps one of the load cases, of the reference as well."""
+        reference = self.objective.reference
+        return self.updated(
+            cases=(self.loads.cases[case],),
+            weights=None,
+            reference=reference and reference.alone(case),
+        )
 
     def with_contact(self, contact: ContactModel) -> Scene:
         """Replaces the law of contact, of the reference as well."""

@@ -9,9 +9,9 @@ import jax
 import numpy as np
 import shapely
 
-from sim.core import Floats, SimulationError
+from sim.core import Floats, Ints, SimulationError
 from sim.scene.expected_cost import count_unknowns, estimate_cost
-from sim.scene.scene import DOFS, Scene
+from sim.scene.scene import DOFS, Scene, displaced
 from sim.solvers import DISPLACEMENT, PrescribedMotion, TimeSeries, single_motions
 from sim.structure import Lattice, polygons
 
@@ -166,7 +166,8 @@ def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iter
             "drive.amplitude",
         )
     if scene.loads.static:
-        _held_back(scene, course, case)
+        others = np.setdiff1d(scene.loads.held, displaced(drive))
+        _held_back(others, course, case)
         if len(drive.loaded) > 0:
             _supported(scene, case)
         return
@@ -210,11 +211,14 @@ def _supported(scene: Scene, case: str) -> None:
         )
 
 
-def _held_back(scene: Scene, course: Floats, case: str) -> None:
-    """Refuses a static load that nothing resists: all driven units move alike, without a turn."""
+def _held_back(held: Ints, course: Floats, case: str) -> None:
+    """Refuses a static load that nothing resists: all driven units move alike, without a turn.
+
+    `held` are the dofs (n,) that are held besides; `course` (n_times, n_driven, 3).
+    """
     alike = (course[..., 2] == 0).all() and (course == course[:, :1]).all()
     moves = np.flatnonzero((course[..., :2] != 0).any(axis=(0, 1)))
-    if alike and len(moves) > 0 and not np.isin(scene.loads.clamped % 3, moves).any():
+    if alike and len(moves) > 0 and not np.isin(held % 3, moves).any():
         raise SceneError(
             f"nothing holds the structure against {case}: it moves along as one; clamp some units",
             "supports",

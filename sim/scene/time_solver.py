@@ -228,10 +228,16 @@ def different_drives(scene: Scene) -> list[PrescribedMotion]:
     found: dict[object, PrescribedMotion] = {}
     for drive in scene.loads.cases:
         motion = drive.motion
-        besides = motion._replace(direction=0.0) if isinstance(motion, DIRECTED) else id(motion)
+        besides = _besides_direction(motion) if isinstance(motion, DIRECTED) else id(motion)
         control = None if drive.control is None else drive.control.tobytes()
         found.setdefault((type(motion), tuple(drive.units), control, besides), drive)
     return list(found.values())
+
+
+def _besides_direction(motion: DIRECTED) -> tuple[float | None, ...]:
+    """Lists all numbers of a law but its direction, of arrays as well."""
+    undirected = motion._replace(direction=0.0)
+    return tuple(None if value is None else float(value) for value in undirected)
 
 
 def _shortened(
@@ -333,7 +339,8 @@ def _size(
     size = np.abs(drive.values(top.held, at)[:, : len(held)] * top.scale[held]).max(initial=0.0)
     if len(drive.loaded) > 0:
         most = drive.forces(at)
-        most = most[np.abs(most[..., :2]).max(axis=(1, 2)).argmax()]
+        sizes = np.abs(most / [1.0, 1.0, top.rotation_scale]).max(axis=(1, 2))
+        most = most[sizes.argmax()]
         of, right = linearised(top, values), np.zeros(3 * top.n_units)
         np.add.at(right, 3 * drive.units[:, None] + np.arange(3), most)
         pushed = spla.spsolve(of.stiffness, right[of.free])

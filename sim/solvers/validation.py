@@ -115,7 +115,7 @@ def check_ligaments(topology: Topology, values: ConcreteParameters, states: Floa
 
     Its energy has a tip there: forces vanish in a state that is far from balance.
     """
-    x, y, turn = states.reshape(len(states), -1, 3).transpose(2, 0, 1)
+    x, y, turn = states.reshape(len(states), states.shape[1] // 3, 3).transpose(2, 0, 1)
     c, s = np.cos(turn), np.sin(turn)
     squares: Floats = np.zeros((len(states), len(values.vector)))
     for axis, (along, sign) in enumerate(((x, -1.0), (y, 1.0))):

@@ -115,6 +115,11 @@ def test_times_and_cases_can_be_chosen() -> None:
     np.testing.assert_array_equal(alone.displacement[0], both.displacement[1])
     with pytest.raises(ValueError, match="sample_times"):
         _ = one.losses
+    region = {"region": np.array([6, 7]), "steps": 2}
+    mimicking = two.updated(**region, reference=two.updated(**region))
+    wider = mimicking.updated(material=two.structure.material._replace(bending_stiffness=3.0))
+    losses = sim.simulate(wider).losses
+    assert float(sim.simulate(wider.alone(1)).loss) == pytest.approx(float(losses[1]), rel=1e-9)
 
 
 def test_a_response_with_half_the_steps_is_near() -> None:

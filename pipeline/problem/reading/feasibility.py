@@ -6,7 +6,13 @@ from collections.abc import Callable
 from pipeline.problem import Problem, cloak_units
 from pipeline.problem.reading import load_checks, region_checks
 from pipeline.problem.reading.fault import Findings, ProblemFault
-from pipeline.problem.sections import ListedNetwork, Quads, Regular
+from pipeline.problem.sections import (
+    HarmonicDrive,
+    ListedNetwork,
+    Quads,
+    RampHarmonicDrive,
+    Regular,
+)
 
 
 def find_faults(problem: Problem) -> Findings:
@@ -72,9 +78,11 @@ def _robust(problem: Problem) -> Findings:
     if problem.objective.snap == "avoid" and not problem.static:
         what = f"a structure under a {problem.drive.kind} drive has no path of equilibria"
         yield ProblemFault(what, ("objective", "snap"), "leave it out, or drive by a linear_ramp")
-    if robust is not None and robust.loads and problem.frequency is None:
-        what = f"a {problem.drive.kind} drive has no frequency to vary"
-        yield ProblemFault(what, ("objective", "robust", "loads"), "leave them out")
+    varied = isinstance(problem.drive, HarmonicDrive | RampHarmonicDrive)
+    if robust is not None and robust.loads and not varied:
+        what = f"a {problem.drive.kind} drive has no frequency and displacement to vary"
+        remedy = "leave them out, or drive by harmonic or ramp_harmonic"
+        yield ProblemFault(what, ("objective", "robust", "loads"), remedy)
 
 
 def _start_is_feasible(problem: Problem) -> Findings:

@@ -76,6 +76,9 @@ def test_specimens_are_assembled_off_their_places(study: tuple[Problem, Path]) -
     usual, wider = (draws(study, samples=6, **nothing, **more) for more in ({}, {"assembly": wide}))
     spread = [made.displacement[:, -1].std(axis=0).max() for made in (usual, wider)]
     assert 0.01 < spread[0] < spread[1]
+    shifted = Assembly.model_validate({"shift": "0.3 mm", "turn": "0 deg"})
+    made = draws(study, samples=6, **nothing, assembly=shifted)
+    assert made.displacement[:, -1].std(axis=0).max() > 0.01
 
 
 def test_limits_hold_the_next_draw() -> None:

@@ -125,6 +125,15 @@ def test_a_force_has_a_course_in_time(tmp_path: Path) -> None:
     assert np.abs(np.asarray(response.displacement[0])[:, RIGHT, 0]).max() > 0.01
 
 
+def test_a_late_moment_is_followed_by_steps_of_its_size(tmp_path: Path) -> None:
+    turn = "kind: torque, units: { units: [[2, 0]] }, amplitude: 2 N mm, width: 5 ms, delay: 40 ms"
+    scene = posed(tmp_path, f"drive: {{ {turn} }}", "duration: 0.1 s, samples: 21")
+    ways = (scene.updated(integrator=name) for name in ("implicit", "explicit"))
+    one, other = (moved(way)[:, 2, 2] for way in ways)
+    assert np.abs(one).max() > 0.005
+    np.testing.assert_allclose(one, other, atol=0.01 * np.abs(one).max())
+
+
 def test_a_driven_edge_may_slide(tmp_path: Path) -> None:
     ramp = "{ kind: linear_ramp, units: right, amplitude: 3 mm, duration: 1 s, directions: [0 deg]"
     held, free = (moved(posed(tmp_path, f"drive: {ramp}{more}}}")) for more in ("", ", free: [uy]"))

@@ -49,7 +49,7 @@ def wave(path: Path) -> Path:
 
 def fail_after(monkeypatch: pytest.MonkeyPatch, runs: int) -> None:
     """Lets so many variants be simulated, and no more."""
-    done = []
+    done: list[Times] = []
 
     def measured(structures: dict[str, PosedStructure], times: Times, threads: int) -> object:
         if len(done) >= runs:

@@ -1,10 +1,12 @@
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from scipy.optimize import brentq
 
 from sim.core import Floats
 from sim.energy import gradient, system_of, workspace
 from sim.quasistatics import StaticSolver, trace
+from sim.quasistatics.arc_length import Tangent
 from tests.sim.quasistatics.test_snaps import Truss, crumpled, with_law
 
 
@@ -67,3 +69,15 @@ def test_every_snap_between_two_loads_is_recorded() -> None:
     )
     assert len(few.snaps) == 2
     np.testing.assert_allclose(few.snaps, many.snaps, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("size", [6, 30])
+def test_modes_are_those_nearest_to_zero_from_below(size: int) -> None:
+    """However large the structure is."""
+    values = np.append([-3.0, -2.0, -1.0], np.arange(1.0, size - 2))
+    tangent = Tangent(sp.csc_array(sp.diags_array(values)), np.ones(size))
+    assert tangent.falling == 3
+    for count in (1, 2, 3):
+        np.testing.assert_allclose(np.sort(tangent.lowest(count)[0])[::-1], values[2::-1][:count])
+    stable = Tangent(sp.csc_array(sp.diags_array(np.abs(values) + 1.0)), np.ones(size))
+    assert stable.lowest(1)[0][0] == pytest.approx(2.0)

@@ -125,6 +125,27 @@ def test_a_path_that_is_not_left_ends_where_the_structure_snaps() -> None:
     assert np.isnan(stayed.states[first:]).all()
 
 
+def test_a_snap_before_any_load_stays_in_the_record() -> None:
+    """The strut, its ligaments longer than there is room for, buckles before its ends part."""
+    rig = Rig(quads(3, 1, 15.0, LENGTH, 0.0), np.array([0]), np.array([2]), LinearRamp(0.001, 1.0))
+    natural = np.tile([0.1, 0.0, 0.0], (2, 1))
+    values = with_law(rig, 120.0, 1.19, 30.0)._replace(natural=natural)
+    record = StaticSolver(rig.topology, np.array([0.5, 1.0])).forward(values, rig.drive)[2]
+    assert np.abs(record.states[:, 4]).min() > 0.1
+    assert record.jumped.tolist() == [BRANCHING, 0]
+    assert record.snaps.tolist() == [0.0]
+    np.testing.assert_array_equal(record.snapped, [0.0, np.nan])
+
+
+def test_a_path_may_end_before_its_first_load() -> None:
+    rig, values = crumpled(19)
+    states, _, record = StaticSolver(rig.topology, np.ones(1), leaves=False).forward(
+        values, rig.drive
+    )
+    assert record.jumped[0] > 0
+    assert np.isnan(states).all()
+
+
 def test_a_snap_ends_where_damped_motion_comes_to_rest() -> None:
     """The motion C dq/dt = -dE/dq is followed by an implicit method of SciPy."""
     rig, values = crumpled(19)

@@ -58,6 +58,12 @@ CONSTANTS = {
     "axial": uneven("axial_stiffness", of_unit=False),
     "shear": uneven("shear_stiffness", of_unit=False),
     "bending": uneven("bending_stiffness", of_unit=False),
+    "length of ligaments": {"material": MATERIAL._replace(elongation=0.1 * right_half(False))},
+    "bend of ligaments": {
+        "material": MATERIAL._replace(
+            end_angles=0.1 * right_half(False)[:, None] * np.array([1.0, -1.0])
+        )
+    },
     "contact": uneven("contact_stiffness", of_unit=False),
     "mass": uneven("density", of_unit=True),
     "damping": uneven("damping_translation", of_unit=True),
@@ -98,6 +104,24 @@ def test_each_case_of_an_uneven_structure_has_its_own_loss(changes: dict[str, An
 def test_an_even_change_of_constants_keeps_them_equal() -> None:
     distance = np.abs(LATTICE.site - LATTICE.site.mean(axis=0)).max(axis=1)
     assert found(scene(material=MATERIAL._replace(density=MATERIAL.density * distance))) == [0, 0]
+    assert found(scene(material=MATERIAL._replace(elongation=np.full(40, 0.1)))) == [0, 0]
+
+
+def test_a_bend_is_told_from_either_end_of_a_ligament() -> None:
+    """All ligaments are bent away from the middle: by the opposite where their ends change."""
+    image = quarter_turn(LATTICE, LATTICE.vertices)
+    assert image is not None
+    bend: np.ndarray = np.zeros(LATTICE.n_ligaments)
+    for first in range(LATTICE.n_ligaments):
+        at, sign = first, 1
+        while bend[at] == 0.0:
+            bend[at] = 0.1 * sign
+            sign, at = sign * image.reversed[at], image.ligament[at]
+    angles = np.stack([bend / 2, -bend / 2], axis=1)
+    assert found(scene(material=MATERIAL._replace(end_angles=angles))) == [0, 0]
+    assert found(scene(material=MATERIAL._replace(end_angles=np.abs(angles)))) == [0, 0]
+    angles = np.full((LATTICE.n_ligaments, 2), [0.05, -0.05])
+    assert found(scene(material=MATERIAL._replace(end_angles=angles))) == [0, 1]
 
 
 def test_driven_units_are_turned_with_their_motion() -> None:

@@ -24,6 +24,7 @@ def test_the_p_mean_goes_from_the_mean_to_the_largest() -> None:
     steps = np.eye(3)
     found = central(lambda h: [float(combined(LOSSES + h * e, WEIGHTS, 8.0)) for e in steps], 1e-6)
     np.testing.assert_allclose(slope, found, rtol=1e-6, atol=1e-9)
+    assert float(combined(0.0 * LOSSES, WEIGHTS, 8.0)) == 0.0
 
 
 def robust(angles: Floats = ANGLES) -> Scene:

@@ -79,6 +79,14 @@ def test_sound_scenes_pass() -> None:
         scene(series(start=1.0)),  # a path begins where its first load is
         scene(series(), **MOVING),
         scene(sim.Harmonic(3.0, 10.0), supports=(), **MOVING),
+        scene(  # each case holds what the other one moves
+            cases=tuple(
+                sim.PrescribedMotion(units, sim.LinearRamp(size, 1.0))
+                for units, size in ((LEFT, 1.0), (LEFT + 4, -1.0))
+            ),
+            weights=None,
+            supports=(),
+        ),
     )
     assert [check_scene(each) for each in sound] == [()] * len(sound)
 

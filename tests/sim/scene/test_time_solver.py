@@ -54,6 +54,12 @@ def test_errors_are_those_that_were_asked_for_and_stated(drive: str) -> None:
     assert abs(losses[0] / right - 1) / 3 < stated_loss
 
 
+def test_numbers_of_a_drive_may_be_arrays() -> None:
+    one, other = sim.Harmonic(3.0, 5.0, 0.6), sim.Harmonic(np.array(3.0), np.array(5.0), 1.0)
+    scene = posed(one)
+    assert len(different_drives(scene.driven_by(one, other))) == 1
+
+
 @pytest.mark.parametrize("drive", some(["a short late pulse", "a spike"], 1))
 def test_implicit_steps_end_where_a_drive_turns(drive: str) -> None:
     scene = posed(DRIVES[drive], integrator="implicit", accuracy="draft")
