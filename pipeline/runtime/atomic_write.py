@@ -11,17 +11,18 @@ import psutil
 from pipeline.runtime.errors import UserError, refusal
 
 
-def sidecar_path(out: Path, source: Path) -> Path:
-    """Names the YAML file beside a result, which must not be the file that asked for it.
+def sidecar_path(out: Path, *sources: Path, suffix: str = ".yaml") -> Path:
+    """Names the file beside a result, which must be neither that nor one it is made of.
 
     Raises:
         UserError: it is.
     """
-    path = out.with_suffix(".yaml")
-    if path.resolve() == source.resolve():
-        what = "this file would be written over"
-        remedy = "give the result another name or folder"
-        raise UserError(what, file=source, key="--out", value=str(out), remedy=remedy)
+    path = out.with_suffix(suffix)
+    for held in (out, *sources):
+        if path.resolve() == held.resolve():
+            what = "this file would be written over"
+            remedy = f"give the result another name or folder; {path.name} is put beside it"
+            raise UserError(what, file=held, key="--out", value=str(out), remedy=remedy)
     return path
 
 

@@ -11,6 +11,7 @@ import atexit
 import ctypes
 import importlib
 import json
+import logging
 import os
 import runpy
 import selectors
@@ -26,6 +27,8 @@ from pathlib import Path
 from typing import NamedTuple, cast
 
 from pipeline.runtime import cli, streams
+
+LOG = logging.getLogger(__name__)
 
 SOCKET = "METACLOAK_STAGES"
 """Names the server's socket in the environment of a workflow's jobs."""
@@ -46,12 +49,21 @@ class _Request(NamedTuple):
 
 
 def start(module: str = __name__) -> None:
-    """Starts the server of this process's jobs; it ends after this process, and its last stage."""
+    """Starts the server of this process's jobs; it ends after this process, and its last stage.
+
+    Where no socket can be made, jobs do their work themselves.
+    """
     if sys.platform != "linux":
         return
     path = Path(tempfile.mkdtemp(prefix="metacloak-")) / "stages"
     listener = socket.socket(socket.AF_UNIX)
-    listener.bind(str(path))
+    try:
+        listener.bind(str(path))
+    except OSError as error:  # a folder for temporary files whose name is longer than a socket's
+        LOG.warning("stages start one by one, which takes longer: %s: %s", path, error)
+        listener.close()
+        path.parent.rmdir()
+        return
     listener.listen(128)
     life, held = os.pipe()  # the server reads its end when this process ends, however it does
     handed = (listener.fileno(), life)

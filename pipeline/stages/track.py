@@ -12,7 +12,14 @@ import xarray as xr
 
 from pipeline import datasets
 from pipeline.datasets import provenance
-from pipeline.runtime import PREFIX, UserError, cli, found_in, write_atomically
+from pipeline.runtime import (
+    PREFIX,
+    UserError,
+    cli,
+    found_in,
+    sidecar_path,
+    write_atomically,
+)
 from pipeline.tracking.frames import (
     SYNTHETIC_LABEL,
     Recording,
@@ -21,7 +28,7 @@ from pipeline.tracking.frames import (
     import_video,
     load_cell,
     read_frames,
-    read_picture,
+    read_pictures,
     recording,
     rendered,
 )
@@ -76,12 +83,13 @@ def _points(path: Path, args: argparse.Namespace) -> None:
     source = _design(asked.design, path, args.design)
     design = as_built(datasets.read(source, "design"), asked.structure)
     held = path.parent / asked.points
+    table = sidecar_path(args.out, path, held, suffix=".csv")
     with found_in(path):
         made = dic_points.track(design, dic_points.read_points(held, asked))
     parents = {"design": source, "points": held}
     origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=asked.synthetic)
     datasets.write(made, args.out, "track", origin)
-    write_track_table(made.assign_attrs(origin), args.out.with_suffix(".csv"))
+    write_track_table(made.assign_attrs(origin), table)
 
 
 def _init(video: Path, args: argparse.Namespace) -> None:
@@ -125,10 +133,8 @@ def _pair(*pictures: Path, args: argparse.Namespace) -> None:
     if len(pictures) != 2 or args.out is None or len(args.at or []) % 2 or not args.at:
         usage = "python -m pipeline track pair FIRST.png LATER.png --at X Y --out motions.csv"
         raise UserError("two pictures, x and y of patches, and a file are wanted", remedy=usage)
-    if args.out.suffix == ".png":
-        remedy = "name a .csv; the picture lies beside it"
-        raise UserError("a table is written there", file=args.out, key="--out", remedy=remedy)
-    before, after = (read_picture(path) for path in pictures)
+    drawing = sidecar_path(args.out, *pictures, suffix=".png")
+    before, after = read_pictures(*pictures)
     centres = np.reshape(args.at, (-1, 2))
     for centre in centres:
         if not (centre >= 0.0).all() or not (centre < before.shape[::-1]).all():
@@ -149,7 +155,7 @@ def _pair(*pictures: Path, args: argparse.Namespace) -> None:
         cv2.polylines(drawn, [corners], True, _ORANGE, 1, cv2.LINE_AA, 4)
     with write_atomically(args.out) as aside:
         aside.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    with write_atomically(args.out.with_suffix(".png")) as aside:
+    with write_atomically(drawing) as aside:
         aside.write_bytes(cv2.imencode(".png", drawn)[1].tobytes())
 
 
@@ -183,6 +189,7 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     if (cell := asked.load_cell) is not None:
         held = parents["load_cell"] = path.parent / cell.file
         log = load_cell.read(held, cell)
+    table = sidecar_path(args.out, path, *parents.values(), suffix=".csv")
     track = followed(asked, design, video, path)
     if cell is not None:
         force = load_cell.forces(log, track.start + track.time)
@@ -190,7 +197,7 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     synthetic = asked.synthetic or rendered(video)
     origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=synthetic)
     datasets.write(made, args.out, "track", origin)
-    write_track_table(made.assign_attrs(origin), args.out.with_suffix(".csv"))
+    write_track_table(made.assign_attrs(origin), table)
     if isinstance(track.ended, KeyboardInterrupt):
         LOG.warning("the %d frames until then are kept in %s", len(track.time), args.out)
         raise track.ended

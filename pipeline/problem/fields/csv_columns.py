@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -66,24 +66,34 @@ def _separator(lines: list[str]) -> str:
     return next(parted, ",")
 
 
-def read_columns(path: Path, names: Iterable[str]) -> Floats:
-    """Reads the named columns (lines, names) as they are; lines with gaps are left out.
+def read_columns(
+    path: Path, names: Sequence[str], dimensions: Sequence[units.Dimension] = ()
+) -> Floats:
+    """Reads the named columns (lines, names); lines with gaps are left out.
 
-    Lines above the heading are comments.
+    Lines above the heading are comments. Where the dimensions of columns are given, and the heading
+    or the line below it has units, numbers are converted to working units; else they are in these.
 
     Raises:
-        UserError: no such file, no such column, or no numbers in them.
+        UserError: no such file, no such column, a unit of another dimension, or no numbers in them.
     """
     import numpy as np
 
     cells = read_cells(path)
-    heading, named = _heading(cells.rows, list(names), path)
+    if dimensions:
+        cells = cells._replace(rows=_with_units_below(cells.rows))
+    heading, named = _heading(cells.rows, names, path)
+    factors: Floats = np.ones(len(names))
+    for place, (name, dimension) in enumerate(zip(names, dimensions, strict=False)):
+        title = cells.rows[heading - 1][named[name]]
+        if _HEADING.fullmatch(title):
+            factors[place] = _factor(title, dimension, name, path)
     found = [[cells.number(row, named[name]) for name in names] for row in cells.rows[heading:]]
     kept = np.array([values for values in found if None not in values], float)
     if not len(kept):
         remedy = "give plain numbers below the heading"
         raise UserError("no line holds numbers in all columns", file=path, remedy=remedy)
-    return kept
+    return kept * factors
 
 
 def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: int = 1) -> Floats:
@@ -138,7 +148,9 @@ def _with_units_below(rows: list[list[str]]) -> list[list[str]]:
     return found
 
 
-def _heading(rows: list[list[str]], wanted: list[str], path: Path) -> tuple[int, dict[str, int]]:
+def _heading(
+    rows: list[list[str]], wanted: Sequence[str], path: Path
+) -> tuple[int, dict[str, int]]:
     """Finds the line of the heading, counted from one, and the column of each name in it."""
     seen: list[str] = []
     for line, row in enumerate(rows, 1):
@@ -150,7 +162,7 @@ def _heading(rows: list[list[str]], wanted: list[str], path: Path) -> tuple[int,
         if len(row) >= len(wanted) and not seen:
             seen = row
     remedy = f"name the columns as the file does; it has: {', '.join(seen) or 'none'}"
-    raise UserError("columns are missing", file=path, value=wanted, remedy=remedy)
+    raise UserError("columns are missing", file=path, value=list(wanted), remedy=remedy)
 
 
 def _factor(title: str, dimension: units.Dimension, name: str, path: Path) -> float:

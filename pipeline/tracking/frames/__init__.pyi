@@ -2,6 +2,7 @@ from . import import_video as import_video
 from . import load_cell as load_cell
 from . import recording as recording
 from .picture import read_picture as read_picture
+from .picture import read_pictures as read_pictures
 from .recording import Recording as Recording
 from .recording import load_recording as load_recording
 from .video import SYNTHETIC_LABEL as SYNTHETIC_LABEL

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.problem.fields import csv_columns
+from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from pipeline.tracking.frames.recording import LoadCellLog
 from sim.core import Floats
@@ -28,7 +28,8 @@ def read(path: Path, cell: LoadCellLog) -> ForceLog:
     Raises:
         UserError: it cannot be read, or runs backwards.
     """
-    clock, force = csv_columns.read_columns(path, (cell.time, cell.force)).T
+    columns, dimensions = (cell.time, cell.force), (units.TIME, units.FORCE)
+    clock, force = csv_columns.read_columns(path, columns, dimensions).T
     if (np.diff(clock) <= 0).any():
         remedy = "sort it by time, each time once"
         raise UserError("the log's time does not ascend", file=path, key=cell.time, remedy=remedy)

@@ -1,22 +1,71 @@
-"""Reads single pictures."""
+"""Reads the brightness of pictures, of whatever depth."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from pipeline.runtime import UserError
+from pipeline.runtime import Picture, UserError
 from sim.core import Image
+
+WHITE = 255.0
+"""Brightness of white."""
+
+_FULL = (1023.0, 4095.0, 16383.0, 65535.0)
+"""Greatest levels of cameras of 10 to 16 bit, whose pictures hold them in 16 bit as they are."""
+
+
+def read_levels(path: Path) -> np.ndarray | None:
+    """Reads the grey levels (rows, columns) that a picture's file holds; None if it cannot."""
+    try:
+        levels = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
+    except cv2.error:  # too many pixels, among others
+        return None
+    return None if levels is None else np.asarray(levels)
+
+
+def full_scale(pictures: Sequence[np.ndarray]) -> float:
+    """Finds the level of white of the camera that took the pictures; see ``brightness``.
+
+    One of 16 bit that used less than a quarter of its range is told as one of less, whose white
+    its brightest pixel does not reach either.
+    """
+    kinds = {levels.dtype for levels in pictures}
+    if kinds <= {np.dtype(np.uint8)}:
+        return WHITE
+    if not all(kind.kind == "u" for kind in kinds):
+        return 1.0
+    most = max(int(levels.max(initial=0)) for levels in pictures)
+    return next(top for top in _FULL if top >= most)
+
+
+def brightness(levels: np.ndarray, top: float) -> Picture:
+    """Computes brightness from 0 to 255, (rows, columns): 8 bit as they are, more as fractions.
+
+    `top` is the level of white; what is brighter counts as white.
+    """
+    if levels.dtype == np.uint8:
+        return levels
+    return np.asarray(np.minimum(levels * (WHITE / top), WHITE), np.float32)
+
+
+def read_pictures(*paths: Path) -> list[Image]:
+    """Reads pictures of one camera in grey levels of 8 bit (rows, columns), on one scale.
+
+    Raises:
+        UserError: one is none.
+    """
+    found = []
+    for path in paths:
+        if (levels := read_levels(path)) is None:
+            remedy = "name a PNG, TIFF or JPEG that is there"
+            raise UserError("no picture that can be read", file=path, remedy=remedy)
+        found.append(levels)
+    top = full_scale(found)
+    return [np.asarray(np.round(brightness(levels, top)), np.uint8) for levels in found]
 
 
 def read_picture(path: Path) -> Image:
-    """Reads a picture as grey levels (rows, columns).
-
-    Raises:
-        UserError: there is none.
-    """
-    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-    if image is None:
-        remedy = "name a PNG, TIFF or JPEG that is there"
-        raise UserError("no picture that can be read", file=path, remedy=remedy)
-    return np.asarray(image, np.uint8)
+    """Reads one picture; see ``read_pictures``."""
+    return read_pictures(path)[0]

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import cast
 
 import av
-import cv2
 import numpy as np
 
 from pipeline.runtime import Picture, UserError
+from pipeline.tracking.frames.picture import WHITE, brightness, full_scale, read_levels
 from sim.core import Floats
 
 SYNTHETIC_LABEL = "SYNTHETIC"
@@ -32,7 +32,8 @@ _ALONE = {
 """Kinds of files that hold what they show: playlists name others, and may wait for more."""
 
 _SUFFIXES = {".png", ".tif", ".tiff"}
-_WHITE = 255.0
+_DEEP_WHITE = 65535.0
+"""White of the frames that FFmpeg gives in 16 bit, however many the file has."""
 _LUMA = np.array([0.299, 0.587, 0.114])
 _COLOURFUL = 2.5
 """Colours that spread so many times more than luma are what tells units from the board."""
@@ -194,14 +195,14 @@ def _colour_axis(frame: av.VideoFrame) -> Floats | None:
         return None
     low, high = np.percentile(colour @ axis, [1, 99])
     gain = _RANGE / max(float(high - low), 1e-9)
-    return np.append(axis * gain, 0.5 * (_WHITE - gain * (high + low)))
+    return np.append(axis * gain, 0.5 * (WHITE - gain * (high + low)))
 
 
 def _projected(frame: av.VideoFrame, axis: Floats) -> Picture:
     deep = max(part.bits for part in frame.format.components) > 8
     colour = frame.to_ndarray(format="rgb48le" if deep else "rgb24").astype(np.float32)
     weights = (axis[:3] / (257.0 if deep else 1.0)).astype(np.float32)
-    return np.asarray(np.clip(colour @ weights + np.float32(axis[3]), 0, _WHITE), np.float32)
+    return np.asarray(np.clip(colour @ weights + np.float32(axis[3]), 0, WHITE), np.float32)
 
 
 def _decoded(
@@ -254,9 +255,9 @@ def _upright(image: Picture, rotation: float) -> Picture:
 
 def _brightness(frame: av.VideoFrame) -> Picture:
     if max(part.bits for part in frame.format.components) > 8:
-        return brightness(frame.to_ndarray(format="gray16le"))
+        return brightness(frame.to_ndarray(format="gray16le"), _DEEP_WHITE)
     if frame.format.name not in _READY:
-        return brightness(frame.to_ndarray(format="gray"))
+        return np.asarray(frame.to_ndarray(format="gray"), np.uint8)
     plane = frame.planes[0]
     rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
     return np.ascontiguousarray(rows[:, : plane.width])
@@ -268,7 +269,11 @@ def pictures(folder: Path) -> list[Path]:
     Raises:
         UserError: there are none.
     """
-    found = [path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES]
+    found = [
+        path
+        for path in folder.iterdir()
+        if path.suffix.lower() in _SUFFIXES and not path.name.startswith(".")
+    ]
     if not found:
         remedy = "give a video file, or a folder of numbered .png or .tif files"
         raise UserError("the folder holds no pictures", file=folder, remedy=remedy)
@@ -282,29 +287,18 @@ def _numbers(path: Path) -> tuple[list[int], str]:
 def images(folder: Path) -> Iterator[Picture]:
     """Reads their brightness, one after the other.
 
+    The first, the last and the one between tell how many levels the camera has.
+
     Raises:
         UserError: one cannot be read.
     """
-    for path in pictures(folder):
-        if (image := _read(path)) is None:
+    found = pictures(folder)
+    some = (read_levels(found[place]) for place in (0, len(found) // 2, -1))
+    top = full_scale([levels for levels in some if levels is not None])
+    for path in found:
+        if (levels := read_levels(path)) is None:
             raise UserError("not a readable picture", file=path, remedy="write the file again")
-        yield image
-
-
-def _read(path: Path) -> Picture | None:
-    try:
-        values = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
-    except cv2.error:  # too many pixels, among others
-        return None
-    return None if values is None else brightness(np.asarray(values))
-
-
-def brightness(values: np.ndarray) -> Picture:
-    """Brightness from 0 to 255, (rows, columns): 8 bit as they are, finer steps as fractions."""
-    if values.dtype == np.uint8:
-        return values
-    top = np.iinfo(values.dtype).max if values.dtype.kind == "u" else 1.0
-    return np.asarray(values * (_WHITE / top), np.float32)
+        yield brightness(levels, top)
 
 
 def rendered(video: Path) -> bool:

@@ -9,7 +9,7 @@ import xarray as xr
 from pydantic import Field
 
 from pipeline.datasets.tables import TABLES
-from pipeline.problem.fields import Angle, Coordinate, Section, csv_columns
+from pipeline.problem.fields import Angle, Coordinate, Section, csv_columns, units
 from pipeline.problem.reading import load_section
 from pipeline.runtime import UserError
 from pipeline.tracking.geometry import (
@@ -101,7 +101,9 @@ def read_points(path: Path, asked: DicExport) -> DicPoints:
         UserError: the file cannot be read, or lacks a column.
     """
     names = asked.columns
-    table = csv_columns.read_columns(path, (names.time, names.x, names.y, names.ux, names.uy))
+    columns = (names.time, names.x, names.y, names.ux, names.uy)
+    dimensions = (units.TIME, *[units.LENGTH] * 4)
+    table = csv_columns.read_columns(path, columns, dimensions)
     upright = np.array([1.0, -1.0 if asked.flipped else 1.0])
     turn = rotation_matrix(asked.rotation)
     place = (table[:, 1:3] - np.array(asked.origin)) * upright @ turn

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.runtime import CaseLog, SweepResult, case_log, write_atomically
+from pipeline.runtime import CaseLog, SweepResult, case_log, sidecar_path, write_atomically
 from tests.tables import refused
 
 OTHER = """
@@ -26,6 +26,15 @@ def test_two_that_write_one_file_do_not_meet(tmp_path: Path) -> None:
         assert aside.read_text() == "ours"
     assert path.read_text() == "ours"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_is_put_beside_a_result_replaces_nothing(tmp_path: Path) -> None:
+    """Neither the result, nor what it is made of: the log of a load cell beside its video."""
+    log = tmp_path / "run1.csv"
+    assert sidecar_path(tmp_path / "track.nc", log, suffix=".csv") == tmp_path / "track.csv"
+    for out in ("run1.nc", "other.csv"):
+        with refused("would be written over", "--out"):
+            sidecar_path(tmp_path / out, tmp_path / "run1.yaml", log, suffix=".csv")
 
 
 def test_what_a_killed_process_left_goes_and_what_a_living_one_writes_stays(tmp_path: Path) -> None:

@@ -85,6 +85,20 @@ def sleeping(folder: Path) -> psutil.Process:
     return psutil.Process(int(process.read_text()))
 
 
+def test_without_a_socket_stages_run_by_themselves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A folder for temporary files, as clusters have them, is too long a name for one."""
+    long = tmp_path / ("scratch" * 20)
+    long.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(long))
+    monkeypatch.delenv(stage_server.SOCKET, raising=False)
+    stage_server.start()
+    assert stage_server.SOCKET not in os.environ
+    assert "stages start one by one" in caplog.text
+    assert not list(long.iterdir())
+
+
 @pytest.mark.usefixtures("server")
 def test_a_stage_has_streams_folder_environment_and_arguments_of_its_client(folder: Path) -> None:
     each = [client(folder, *words) for words in (["3", "a b"], ["0"], ["segfault"])]

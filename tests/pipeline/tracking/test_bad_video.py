@@ -11,7 +11,13 @@ import pytest
 from benchmarks.tracking.rendering import write_video
 from pipeline.runtime import UserError
 from pipeline.tracking.detect import orientation_text
-from pipeline.tracking.frames import BrokenOffError, Frame, import_video, read_frames
+from pipeline.tracking.frames import (
+    BrokenOffError,
+    Frame,
+    import_video,
+    read_frames,
+    read_pictures,
+)
 from pipeline.tracking.geometry import outlines_of_design
 from pipeline.tracking.motion import Track, track_video
 from tests.pipeline.tracking.conftest import CLIPS
@@ -59,6 +65,24 @@ def test_pictures_of_16_bit_in_a_folder_are_a_video(tmp_path: Path, clip: list[n
     read = list(read_frames(tmp_path, rate=50.0))
     assert [frame.time for frame in read] == [0.0, 0.02, 0.04, 0.06]
     np.testing.assert_allclose(read[3].image, clip[3], atol=1e-3)
+
+
+@pytest.mark.parametrize("bits", [10, 12, 16])
+def test_pictures_keep_the_levels_of_their_camera(
+    tmp_path: Path, clip: list[np.ndarray], bits: int
+) -> None:
+    """Of 10 or 12 bit, in 16 as they are; what a Mac leaves beside a file is no picture."""
+    deep = [image.astype(np.uint16) * (2**bits // 256) for image in clip]
+    for number, levels in enumerate(deep):
+        assert cv2.imwrite(str(tmp_path / f"frame{number}.tif"), levels)
+        (tmp_path / f"._frame{number}.tif").write_bytes(b"a fork")
+    read = list(read_frames(tmp_path, rate=50.0))
+    assert len(read) == len(clip)
+    for frame, image in zip(read, clip, strict=True):
+        np.testing.assert_allclose(frame.image, image, atol=1.0)
+    dim, full = read_pictures(*(tmp_path / f"frame{number}.tif" for number in (0, 1)))
+    assert np.abs(dim.astype(float) - clip[0]).max() <= 1.0
+    assert np.abs(full.astype(float) - clip[1]).max() <= 1.0
 
 
 def test_faulty_folders_of_pictures_are_told(tmp_path: Path, clip: list[np.ndarray]) -> None:

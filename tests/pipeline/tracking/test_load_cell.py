@@ -37,3 +37,17 @@ def test_a_faulty_log_is_refused(tmp_path: Path, text: str, offset: float, told:
     path, cell = log(tmp_path, text), LoadCellLog(file="load.csv", offset=offset)
     with refused(told):
         load_cell.check(load_cell.read(path, cell), TIME, path, cell)
+
+
+def test_units_of_a_log_are_those_of_its_heading(tmp_path: Path) -> None:
+    cell = LoadCellLog(file="load.csv", time="Time", force="Load")
+    plain = load_cell.read(log(tmp_path, "Time,Load\n0.1,20\n0.2,40\n"), cell)
+    for text in (
+        "Time (ms),Load (kN)\n100,0.02\n200,0.04\n",
+        "Time,Load\n(ms),(kN)\n100,0.02\n200,0.04\n",
+    ):
+        found = load_cell.read(log(tmp_path, text), cell)
+        np.testing.assert_allclose(found.clock, plain.clock)
+        np.testing.assert_allclose(found.force, plain.force)
+    with refused("is not that of a force", "Load"):
+        load_cell.read(log(tmp_path, "Time (s),Load (mm)\n0.1,20\n"), cell)

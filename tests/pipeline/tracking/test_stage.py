@@ -50,7 +50,7 @@ def test_a_command_finds_turned_patches(tmp_path: Path, capsys: pytest.CaptureFi
     for wrong, words in (
         (table, "--at X Y"),
         ([*table, "--at", "600", "9"], "outside of the picture"),
-        ([*table, "--at", *at, "--out", "a.png"], "name a .csv"),
+        ([*table, "--at", *at, "--out", "a.png"], "put beside it"),
     ):
         assert run_stage("track", wrong) == 2
         assert words in capsys.readouterr().err

@@ -4,6 +4,7 @@ import logging
 from dataclasses import replace
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -55,7 +56,7 @@ def test_errors_are_those_that_were_asked_for_and_stated(drive: str) -> None:
 
 
 def test_numbers_of_a_drive_may_be_arrays() -> None:
-    one, other = sim.Harmonic(3.0, 5.0, 0.6), sim.Harmonic(np.array(3.0), np.array(5.0), 1.0)
+    one, other = sim.Harmonic(3.0, 5.0, 0.6), sim.Harmonic(jnp.array(3.0), jnp.array(5.0), 1.0)
     scene = posed(one)
     assert len(different_drives(scene.driven_by(one, other))) == 1
 
