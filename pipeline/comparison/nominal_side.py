@@ -9,6 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.comparison import alignment
 from pipeline.comparison.alignment import Lag, SampledMotion
+from pipeline.runtime import UserError
 from sim.core import Floats
 
 
@@ -45,9 +46,13 @@ def find_axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool
         static: whether it is a path of equilibria.
 
     Raises:
-        UserError: the drive cannot be aligned.
+        UserError: the drive cannot be aligned, or is a force, a moment or a rotation.
     """
     nominal = SampledMotion(response["time"].values, response["drive_displacement"].values)
+    if not nominal.value.any():
+        what = "the drive displaces no units, along which frames could be placed"
+        remedy = "drive the problem by the displacement that was filmed, or remove the recording"
+        raise UserError(what, key="drive.kind", remedy=remedy)
     if not static:
         lag = alignment.find_lag(SampledMotion(time, drive), nominal)
         turn = alignment.drive_turn(drive, nominal.at(time - lag.value))

@@ -31,6 +31,7 @@ rule front_page:
     threads: 1
     params:
         folder=subpath(output.page, parent=True),
+        problem=rule_inputs.section("report"),
         source=source_hash(REPORTS["front"].module),
     message:
         "Drawing what it costs {wildcards.name} to hold against any load"

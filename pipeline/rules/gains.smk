@@ -29,6 +29,7 @@ rule robust_gains_page:
     threads: 1
     params:
         folder=subpath(output.page, parent=True),
+        problem=rule_inputs.section("report"),
         source=source_hash(REPORTS["robust-gains"].module),
     message:
         "Drawing what the robust presets of {wildcards.name} gain"

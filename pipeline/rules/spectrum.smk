@@ -35,7 +35,7 @@ rule spectrum_page:
     params:
         study=rule_inputs.options,
         folder=subpath(output.page, parent=True),
-        problem=rule_inputs.section("spectrum"),
+        problem=rule_inputs.section("report"),
         source=source_hash(REPORTS["spectrum"].module),
     message:
         "Drawing modes, transmission and waves of {wildcards.name}{wildcards.preset}"

@@ -158,8 +158,8 @@ def hold_studies(files: Iterable[str]) -> None:
 
 
 def study_of(wildcards: Wildcards) -> Study:
-    """Names the study that a job works on, from its wildcards `name` and `preset`."""
-    return Study.parse(f"{wildcards.name}{wildcards.preset}")
+    """Names the study that a job works on, from its wildcards `name` and, if any, `preset`."""
+    return Study.parse(f"{wildcards.name}{wildcards.get('preset', '')}")
 
 
 def options(wildcards: Wildcards) -> str:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,9 +16,10 @@ from pipeline.comparison.alignment import (
     find_lag,
     find_load_time,
 )
+from pipeline.comparison.nominal_side import find_axis
 from pipeline.runtime import UserError
 from tests.pipeline.samples import sample
-from tests.tables import some
+from tests.tables import refused, some
 
 RATE = 60.0
 TIMES = np.linspace(0.0, 2.0, 401)
@@ -180,3 +182,13 @@ def test_the_scale_stays_and_unseen_units_do_not_count() -> None:
 def test_a_track_without_a_camera_has_no_pixels() -> None:
     points = sample("track").assign(camera_homography=(("row", "column"), np.full((3, 3), np.nan)))
     assert np.isnan(pixel_size(points, np.zeros(2)))
+
+
+@pytest.mark.parametrize("static", [True, False])
+def test_a_drive_by_a_force_has_no_axis(static: bool) -> None:
+    response = xr.Dataset(
+        {"drive_displacement": (("time", "xy"), np.zeros((5, 2)))},
+        {"time": np.linspace(0.0, 1.0, 5), "direction": 0.0},
+    )
+    with refused("displaces no units", "drive.kind"):
+        find_axis(TIMES, sine(TIMES), response, static=static)
