@@ -56,9 +56,9 @@ def joined(stage: str, kind: Kind, folder: Path, out: Path, count: int) -> bytes
     return out.read_bytes()
 
 
-def write(path: Path) -> Path:
+def write(path: Path, preset: str | None = None) -> Path:
     """Writes design.nc beside a problem file."""
-    asked, one = problem.load(path), dict.fromkeys(("method", "evaluation", "variable"), 1)
+    asked, one = problem.load(path, preset), dict.fromkeys(("method", "evaluation", "variable"), 1)
     sizes = one | {"case": len(posing.case_directions(asked)), "constraint": 0}
     none, out = np.zeros(0, "U1"), path.with_name("design.nc")
     made = design(asked, path.parent, filled("design", sizes)).assign_coords(

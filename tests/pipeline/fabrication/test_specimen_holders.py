@@ -1,0 +1,69 @@
+"""Bars hold all units of an edge, and do not stand in one another's way."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from pipeline import datasets, problem
+from pipeline.fabrication.fixtures import fixtures
+from pipeline.fabrication.fixtures.specimen_holders import held_edges
+from pipeline.fabrication.parts import BuiltSpecimen
+from pipeline.fabrication.units import build_specimen, network
+from pipeline.problem import Problem
+from pipeline.runtime import ROOT
+from tests.pipeline import unchanged
+from tests.pipeline.fabrication import handmade
+
+
+def built(folder: Path, name: str) -> tuple[Problem, BuiltSpecimen]:
+    """The draft of a study, undesigned."""
+    asked = problem.load(ROOT / f"experiments/{name}/problem.yaml", "quick")
+    path = folder / "problem.yaml"
+    text = (ROOT / f"experiments/{name}/problem.yaml").read_text(encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
+    design = unchanged.write(path, "quick")
+    net = network(datasets.read(design, "design"), "altered")
+    return asked, build_specimen(net, asked.fabrication, (name, "altered"), design)
+
+
+def test_both_triangles_of_a_cell_are_held_by_one_bar(tmp_path: Path) -> None:
+    asked, specimen = built(tmp_path, "kagome")
+    bases = {
+        part.id: part.layers[1].area
+        for part in fixtures(specimen, asked.fabrication, asked.lattice.spacing)
+        if part.id.startswith(("CLAMP", "DRIVE")) and not part.id.endswith("LID")
+    }
+    assert len(bases) == 2
+    for kind, labels in (("CLAMP", specimen.clamped), ("DRIVE", specimen.driven)):
+        (base,) = (area for name, area in bases.items() if name.startswith(kind))
+        assert len(labels) == 12
+        for label in labels:
+            outline = specimen.by_label[label].outline
+            assert base.intersection(outline).area > 0.3 * outline.area
+    assert shapely.intersection_all(list(bases.values())).is_empty
+
+
+def test_units_of_a_list_are_grouped_by_where_they_are() -> None:
+    """Those of a file of polygons are all in one row."""
+    made = handmade.specimen()
+    units = [replace(unit, column=n, row=0) for n, unit in enumerate(made.units)]
+    listed = replace(made, units=tuple(units))
+    left = [unit for unit in units if unit.design.centroid.x < handmade.SPACING / 2]
+    edges, others = held_edges(units, listed, handmade.SPACING)
+    assert len(edges) * 3 + len(others) == len(units)
+    assert all(edge.along == 0 for edge in edges)
+    assert held_edges(left, listed, handmade.SPACING) == ([], left)
+    assert np.ptp([unit.design.centroid.y for unit in edges[0].units]) < 1.0
+
+
+@pytest.mark.parametrize("name", ["fig4"])
+def test_columns_of_squares_are_held_as_they_were(name: str, tmp_path: Path) -> None:
+    _, specimen = built(tmp_path, name)
+    held = [specimen.by_label[label] for label in specimen.clamped]
+    (edge,), others = held_edges(held, specimen, 15.0)
+    assert not others
+    assert edge.along == 1
+    assert {unit.column for unit in edge.units} == {0}
