@@ -13,6 +13,8 @@ from sim.scene import mimicking, simulate, target_motion
 from sim.structure import clearance
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
 
     from pipeline.posing.case_result import CaseResult, PosedStructure, Times
@@ -55,10 +57,13 @@ def by_contact(
     return {name: (_DIMS, found[:, :, k]) for k, name in enumerate(_MEASURES)}
 
 
-def cloak_losses(response: xr.Dataset) -> tuple[float, float]:
-    """Reads the losses of a cloak by the angle law and with contact on distance; NaN if none."""
-    losses = response["loss_by_contact"].sel(structure="cloaked").mean("case")
-    angle, distance = (float(losses.sel(contact_law=law)) for law in LAWS)
+def cloak_losses(response: xr.Dataset, weights: Sequence[float]) -> tuple[float, float]:
+    """Reads the losses of a cloak by the angle law and with contact on distance; NaN if none.
+
+    They are means over the load cases with these weights, which add up to 1.
+    """
+    losses = response["loss_by_contact"].sel(structure="cloaked")
+    angle, distance = (float(np.dot(weights, losses.sel(contact_law=law).values)) for law in LAWS)
     return angle, distance
 
 

@@ -29,7 +29,8 @@ def work(args: argparse.Namespace) -> None:
     """
     asked = problem.load(args.problem, args.preset)
     design = read_design(asked, args.design)
-    angle, distance = law_comparison.cloak_losses(datasets.read(args.response, "response"))
+    response = datasets.read(args.response, "response")
+    angle, distance = law_comparison.cloak_losses(response, asked.drive.case_weights)
     alike = abs(distance - angle) <= law_comparison.DIFFERENCE * angle
     LOG.info(
         "loss %.5g by angles, %.5g by distances: %s", angle, distance, "kept" if alike else "again"

@@ -105,7 +105,7 @@ def _finer_loads(
     as_run = tables[AS_RUN]
     found = {
         name: {
-            structure: _numbers(cases, as_run[structure], _share(asked, posed[name]))
+            structure: _numbers(cases, as_run[structure], asked, _share(asked, posed[name]))
             for structure, cases in table.items()
         }
         for name, table in tables.items()
@@ -121,13 +121,15 @@ def _share(asked: Problem, variant: Problem) -> float:
     return float(np.sqrt(asked.horizon.steps / variant.horizon.steps)) if mimics else 1.0
 
 
-def _numbers(cases: list[CaseResult], as_run: list[CaseResult], share: float) -> CheckResult:
+def _numbers(
+    cases: list[CaseResult], as_run: list[CaseResult], asked: Problem, share: float
+) -> CheckResult:
     apart = [
         np.linalg.norm((one.displacement - other.displacement)[..., :2], axis=-1).max()
         for one, other in zip(cases, as_run, strict=True)
     ]
     return CheckResult(
-        loss=share * float(np.mean([case.loss for case in cases])),
+        loss=share * float(np.dot(asked.drive.case_weights, [case.loss for case in cases])),
         departure=float(max(apart)),
         min_void_angle=min(float(case.observables.void_angle.min()) for case in cases),
         gap=min(float(np.nanmin(case.gap)) for case in cases),

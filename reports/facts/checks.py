@@ -10,7 +10,7 @@ from pipeline.posing import design_hash
 from pipeline.problem import Problem
 from reports.facts import foil, measures
 from reports.facts.fact_records import Fact, facts_of, percent, within, worded
-from reports.study import RigidUnits, display_name
+from reports.study import RigidUnits, display_name, evaluation_count
 from sim.core import instruction_set
 
 JUMPED = 2
@@ -27,8 +27,8 @@ def history_facts(problem: Problem, design: xr.Dataset) -> Iterator[Fact]:
     for method in design["method"].values:
         history, of = design.sel({"method": method}), {"method": method, "name": method.upper()}
         loss, at = history["loss"].values, int(history["best_evaluation"])
-        count, best = int(np.isfinite(loss).sum()), float(history["best_loss"])
-        soon = measures.first_within(loss[:count], best, 0.9)
+        count, best = evaluation_count(history), float(history["best_loss"])
+        soon = measures.first_within(loss, best, 0.9)
         yield _told("evaluations_{method}", count, at=at, soon=soon, **of)
         note = "shipped" if method == design.attrs.get("shipped_method") else "not shipped"
         yield _told("best_{method}", best, unit=unit, note=note, **of)

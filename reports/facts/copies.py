@@ -54,7 +54,10 @@ def worst_copy_fact(key: str, label: str, unit: str, found: Sequence[Spread]) ->
     if known:
         worst = max(known, key=lambda each: (each.noise.startswith("together"), each.high))
         told = {"key": key, "what": label, "unit": unit}
-        yield _told("{key}_copies", worst.high, note=in_words(worst.noise), **told)
+        note = in_words(worst.noise)
+        if worst.failed:
+            note += f"; {worst.failed} of {worst.count + worst.failed} copies failed, not counted"
+        yield _told("{key}_copies", worst.high, note=note, **told)
 
 
 def loss_facts(study: StudyResults) -> Iterator[Fact]:

@@ -34,8 +34,11 @@ def history(design: xr.Dataset) -> Columns:
         "evaluation": evaluation,
         "J": loss[method, evaluation],
     }
-    for k, angle in enumerate(design["direction"].values):
-        columns[f"J_{angle:g}deg"] = cases[method, evaluation, k]
+    names = [f"J_{angle:g}deg" for angle in design["direction"].values]
+    if len(set(names)) < len(names):  # of several drives, or of one without a direction
+        names = [f"J_load_{k}" for k in range(1, len(names) + 1)]
+    for k, name in enumerate(names):
+        columns[name] = cases[method, evaluation, k]
     for name in ("violation", "accepted"):
         values = design[name].transpose("method", "evaluation").values
         columns[name] = values[method, evaluation]

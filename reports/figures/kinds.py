@@ -3,8 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from pipeline.problem import Problem
-from pipeline.problem.sections import HarmonicDrive, RampHarmonicDrive
+from pipeline.problem.sections import HarmonicDrive, Quads, RampHarmonicDrive, resolve_centre
 from reports.facts import Fact
 from reports.figures import loading_path, shielding, wave
 from reports.figures.shielding import MAPPED
@@ -55,10 +57,21 @@ WAVE = ReportKind(
 
 
 def kind_of(problem: Problem) -> ReportKind:
-    """Returns the report of a problem: shielding with its map, of a wave, or along a path."""
+    """Returns the report of a problem: shielding with its map, of a wave, or along a path.
+
+    That of shielding is of squares with a round cloak in their middle.
+    """
     shaken, sweep = isinstance(problem.drive, HarmonicDrive | RampHarmonicDrive), problem.sweep
     mapped = sweep is not None and sweep.grid is not None and set(sweep.keys) == {*MAPPED}
-    if shaken and mapped:
+    if shaken and mapped and _is_central(problem):
         return SHIELDING
     mimics = problem.objective.kind == "displacement" and problem.objective.target == "intact"
     return WAVE if mimics and not problem.static else LOADING_PATH
+
+
+def _is_central(problem: Problem) -> bool:
+    """Tells a round cloak about the middle of a lattice of squares."""
+    lattice, bounds = problem.lattice, problem.cloak.bounds
+    if bounds is None or not isinstance(lattice, Quads):
+        return False
+    return bool(np.allclose(resolve_centre(bounds[0], lattice.centre_site), lattice.centre_site))

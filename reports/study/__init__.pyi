@@ -14,7 +14,9 @@ from .rigid_units import RigidUnits as RigidUnits
 from .rigid_units import deformed as deformed
 from .rigid_units import from_dataset as from_dataset
 from .rigid_units import middle_of_top_edge as middle_of_top_edge
+from .rigid_units import on_lattice as on_lattice
 from .rigid_units import unit_at as unit_at
 from .study_results import RedesignResults as RedesignResults
 from .study_results import StudyResults as StudyResults
 from .study_results import display_name as display_name
+from .study_results import evaluation_count as evaluation_count

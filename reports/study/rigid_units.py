@@ -4,12 +4,13 @@ A unit moves as a rigid body: vertex = centroid + u + R(theta) (vertex - centroi
 PolyCollection and ligaments one broken line, so that a figure of a dozen structures stays small.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from pipeline.problem.sections import Lattice
 from sim.core import Floats, Ints
 
 SURROUNDINGS, CLOAK, SOURCE, VOID, INCLUSION = range(5)
@@ -48,8 +49,17 @@ class RigidUnits:
         return np.asarray(np.isfinite(self.vertices[..., 0]).any(axis=1))
 
 
+def on_lattice(data: xr.Dataset, lattice: Lattice) -> RigidUnits:
+    """Returns structure of a dataset as ``from_dataset`` does, its sites those of any lattice."""
+    held = from_dataset(data, lattice.spacing)
+    return replace(held, site=np.array([(x, y) for _, x, y in lattice.sites()]))
+
+
 def from_dataset(data: xr.Dataset, spacing: float, vertices: str = "vertices") -> RigidUnits:
-    """Returns structure held by a design dataset, or by one `structure` of a response dataset."""
+    """Returns structure held by a design dataset, or by one `structure` of a response dataset.
+
+    Its sites are those of a square lattice; see ``on_lattice``.
+    """
     index = np.stack([data["i"].values, data["j"].values], axis=-1)
     shape = data[vertices].transpose("unit", "vertex", "xy").values.astype(float)
     unit, vertex = (data[name].values.astype(int) for name in ("ligament_unit", "ligament_vertex"))

@@ -22,6 +22,11 @@ from reports.study.recorded_motion import RecordedMotion
 from reports.study.report_scene import ReportScene
 
 
+def evaluation_count(design: xr.Dataset) -> int:
+    """Counts the evaluations of a design, or of one of its methods, those that failed as well."""
+    return int(np.isfinite(design["violation"]).sum())
+
+
 @dataclass(frozen=True)
 class RedesignResults:
     """Holds the design for contact on distance, and what the structures do with that contact."""
@@ -32,7 +37,7 @@ class RedesignResults:
     @property
     def evaluations(self) -> int:
         """Returns number of evaluations of the second optimisation."""
-        return int(np.isfinite(self.design["loss"]).sum())
+        return evaluation_count(self.design)
 
     @property
     def changed(self) -> bool:

@@ -78,8 +78,9 @@ def one_kind_of_load(problem: Problem) -> Findings:
         if slow:
             what = f"a {slow[0]} is a slow load, and another of the drives is not"
             yield ProblemFault(what, ("drives",), "give all of them a course in time, or none")
-    if problem.spectrum is not None and any(d.kind in ("force", "torque") for d in kinds):
-        what = "a spectrum tells the transmission of a displacement, not of a force"
+    displaced = len(kinds) == 1 and isinstance(kinds[0], DisplacementDrive)
+    if problem.spectrum is not None and not displaced:
+        what = f"a spectrum is that of one displacement along a line, not of a {problem.drive.kind}"
         yield ProblemFault(what, ("spectrum",), "leave it out, or drive by a displacement")
 
 

@@ -5,8 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.problem import Problem, driven_units
-from pipeline.problem.sections import Kagome, Lattice, ListedNetwork, single_drives
+from pipeline.problem import Problem
+from pipeline.problem.sections import (
+    Kagome,
+    Lattice,
+    ListedNetwork,
+    selected_units,
+    single_drives,
+)
 from reports.figures.loading_path.drive_response import driven_displacement
 from sim.core import Floats
 
@@ -29,8 +35,9 @@ class Abscissa:
     """Tells where along the path every sample of a response lies.
 
     `values` (n_times,) is what the first drive grows by (the displacement of the driven units along
-    it in mm, a force in N, a moment in N mm, an angle in degrees), or the time in s; `strain` is a
-    paper's label of the last value (a fraction of one), `shown` are the samples of the snapshots.
+    it in mm, a force in N, a moment in N mm, an angle in degrees, either way), or the time in s;
+    `strain` is a paper's label of the last value (a fraction of one), `shown` are the samples of
+    the snapshots.
     """
 
     name: str
@@ -68,7 +75,9 @@ def abscissa_of(problem: Problem, response: xr.Dataset) -> Abscissa:
     if not static:
         name, symbol, unit, values = "Time", "$t$", "s", time
     elif kind in LOADS:
-        values = factor * float(response["amplitude"][0]) * time / time[-1]
+        most = factor * float(response["amplitude"][0])
+        values = abs(most) * time / time[-1]
+        name += ", clockwise" if most < 0.0 else ""
     else:
         values = driven_displacement(problem, response).isel(structure=0, case=0).values
     return Abscissa(
@@ -87,7 +96,11 @@ def load_names(problem: Problem, response: xr.Dataset | xr.DataArray) -> tuple[s
     angles = response["direction"].values.astype(float)
     if not problem.static or np.isnan(angles).any():
         return tuple(f"load {number + 1}" for number in range(len(angles)))
-    return tuple(f"{load_kind(problem, angle)} {angle % 360.0:g}°" for angle in angles)
+    names = [f"{load_kind(problem, angle)} {angle % 360.0:g}°" for angle in angles]
+    if len(set(names)) == len(names):
+        return tuple(names)
+    # of several drives the first one may be the same in all cases
+    return tuple(f"load {number}, {name}" for number, name in enumerate(names, 1))
 
 
 def load_kind(problem: Problem, angle: float) -> str:
@@ -99,9 +112,10 @@ def load_kind(problem: Problem, angle: float) -> str:
 
 
 def driven_side(problem: Problem) -> tuple[Floats, int]:
-    """Finds the vector (2,) from the middle to the driven units, and its larger component."""
+    """Finds the vector (2,) from the middle to the units first driven, and its larger component."""
+    first = single_drives(problem.drive)[0]
     sites = {unit: (x, y) for unit, x, y in problem.lattice.sites()}
-    driven = [sites[unit] for unit in driven_units(problem)]
+    driven = [sites[unit] for unit in selected_units(first.units, problem.lattice)]
     outward = np.mean(driven, axis=0) - np.array(list(sites.values())).mean(axis=0)
     return np.asarray(outward), int(np.argmax(np.abs(outward)))
 

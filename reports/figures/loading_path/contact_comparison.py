@@ -32,7 +32,7 @@ def _by_law(
     problem: Problem, response: xr.Dataset, names: Sequence[str], own: str, whose: str = ""
 ) -> Iterator[Fact]:
     """Yields a row for every structure and law; the other law's tells the change from `own`."""
-    losses = response["loss_by_contact"].mean("case")
+    losses = over_cases(problem, response["loss_by_contact"])
     unit = response["loss_by_contact"].attrs["units"]
     for name in names:
         for law in (str(law) for law in response["contact_law"].values):

@@ -38,6 +38,7 @@ RIGHT_AXIS = 9.0
 """Room for the labels of an axis on the right, mm."""
 
 _FLAT = 0.05
+_LINE, _MOST_ROOM = 0.1, 0.6  # of a panel's height: a line of its legend, and all lines at most
 """Share of the altered structure's measure below which a curve is seen on a logarithmic axis."""
 
 
@@ -105,7 +106,7 @@ def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Meas
     measured.bands(axes, study, measure.key)
     measured.measured_curves(axes, study, path, measure.of, names)
     legend = axes.legend(loc="upper left", handlelength=1.2)
-    room = 0.1 * len(legend.get_texts())
+    room = min(_LINE * len(legend.get_texts()), _MOST_ROOM)
     if vanishes:
         seen = values.sel(structure=names).isel(time=slice(1, None)).values
         low, high = 0.5 * float(np.nanmin(seen[seen > 0.0])), 1.1 * float(np.nanmax(seen))

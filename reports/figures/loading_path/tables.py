@@ -35,7 +35,7 @@ def by_structure(study: StudyResults, series: Mapping[str, xr.DataArray]) -> Col
         for name in structures(study.response):
             columns[f"{name}_{label}"] = mean.sel(structure=name).values
             for case, load in enumerate(loads if len(loads) > 1 else ()):
-                suffix = load.replace(" ", "_").replace("°", "deg")
+                suffix = load.replace(",", "").replace(" ", "_").replace("°", "deg")
                 one = values.sel(structure=name).isel(case=case)
                 columns[f"{name}_{label}_{suffix}"] = one.values
     return columns

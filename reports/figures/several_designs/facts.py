@@ -8,7 +8,7 @@ import numpy as np
 
 from reports.facts import Fact, checks, facts_of, grouped
 from reports.figures.several_designs.designs import DesignSeries, SeriesDesign
-from reports.study import from_dataset
+from reports.study import evaluation_count, from_dataset
 
 _told = facts_of(__file__)
 
@@ -64,7 +64,7 @@ def _design(design: SeriesDesign) -> Iterator[Fact]:
     yield told("design_{number}.loss", design.loss("cloaked"))
     yield told("design_{number}.loss_altered", design.loss("altered"))
     found = design.study.design
-    yield told("design_{number}.evaluations", int(np.isfinite(found["loss"]).sum()))
+    yield told("design_{number}.evaluations", evaluation_count(found))
     for fact in checks.design_facts(found):
         yield replace(fact, key=f"design_{design.number}.{fact.key}")
     moving = float(design.study.response["min_gap"].sel(structure="cloaked").min())

@@ -26,7 +26,7 @@ SHOWN = 45.0
 
 def several_designs_report(series: DesignSeries) -> Report:
     """Returns the report."""
-    paper, title = series.problem.report.paper, series.problem.title
+    paper, title = series.problem.report.paper, series.problem.title or series.name
     facts = fact_records.quoted(design_series_facts(series), paper)
     by_key = {fact.key: fact for fact in facts}
     figure = design_series_figure(series)

@@ -1,6 +1,7 @@
 """Makes the report of several studies: facts and tables by study, one animation of all."""
 
 import argparse
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -76,7 +77,14 @@ def _credit(studies: Sequence[StudyResults]) -> str:
 
 def _caption(studies: Sequence[StudyResults]) -> str:
     names = ", ".join(heading(study).lower() for study in studies)
-    return str(_PROSE["caption"]).format(names=names, marks=loading_path.marks(studies))
+    labels = (measures.measure_of(study.problem).label for study in studies)
+    words = dict.fromkeys(f"{label[0].lower()}{label[1:]}" for label in labels)
+    return str(_PROSE["caption"]).format(
+        names=names,
+        shade=re.sub(r"_(\w)", r"<sub>\1</sub>", loading_path.fields(studies[0])[0].label),
+        measures=" and ".join(words),
+        marks=loading_path.marks(studies),
+    )
 
 
 def _animation(studies: Sequence[StudyResults]) -> Animation:

@@ -32,6 +32,7 @@ from reports.study import (
     ReportScene,
     StudyResults,
     cycles,
+    evaluation_count,
     from_dataset,
     middle_of_top_edge,
 )
@@ -123,8 +124,8 @@ def history_facts(design: xr.Dataset) -> Iterator[Fact]:
     for method in design["method"].values:
         history, of = design.sel({"method": method}), {"method": method, "name": method.upper()}
         loss, at = history["loss"].values, int(history["best_evaluation"])
-        count, best = int(np.isfinite(loss).sum()), float(history["best_loss"])
-        soon = measures.first_within(loss[:count], best, 0.9)
+        count, best = evaluation_count(history), float(history["best_loss"])
+        soon = measures.first_within(loss, best, 0.9)
         yield _told("evaluations_{method}", count, at=at, soon=soon, **of)
         note = "shipped" if method == design.attrs.get("shipped_method") else "not shipped"
         yield _loss("best_{method}", best, note=note, **of)

@@ -72,20 +72,21 @@ def sum_facts(study: StudyResults) -> Iterator[Fact]:
 
 def place_facts(study: StudyResults) -> Iterator[Fact]:
     """Tells how far u_y is from that of the intact structure at the marked places."""
-    rise = over_cases(study.problem, study.response["displacement"].sel(dof="uy"))
+    rise = study.response["displacement"].sel(dof="uy")
     for k, place in enumerate(places(study.problem, study.response)):
         curves = rise.isel(unit=place.unit)
         intact = curves.sel(structure="intact")
         most = worded(float(np.abs(intact).max()), "mm", 3)
         for name in ("altered", "cloaked"):
-            apart = ((curves.sel(structure=name) - intact) ** 2).mean("time") ** 0.5
+            squares = ((curves.sel(structure=name) - intact) ** 2).mean("time")
+            apart = over_cases(study.problem, squares**0.5)
             of = {"name": name, "shown": display_name(study.problem, name).lower()}
             yield _told("place_{k}_{name}", float(apart), k=k + 1, place=place, most=most, **of)
 
 
 def edge_facts(study: StudyResults) -> Iterator[Fact]:
     """Yields closed voids along the top and bottom edges."""
-    counts = over_cases(study.problem, edge_contacts(study.problem, study.response))
+    counts = edge_contacts(study.problem, study.response).max("case")
     for name in structures(study.response):
         of_one = counts.sel(structure=name)
         of = {"name": name, "shown": display_name(study.problem, name).lower()}

@@ -7,7 +7,7 @@ import xarray as xr
 
 from pipeline.problem import Problem
 from reports.figures.loading_path import interest, scales, squares
-from reports.study import RigidUnits, from_dataset, middle_of_top_edge, unit_at
+from reports.study import RigidUnits, middle_of_top_edge, on_lattice, unit_at
 
 Mark = str | tuple[int, int, int]
 
@@ -37,7 +37,7 @@ def places(problem: Problem, response: xr.Dataset) -> list[MonitoredUnit]:
 
 def first_structure(problem: Problem, response: xr.Dataset) -> RigidUnits:
     """Returns the intact structure."""
-    return from_dataset(response.sel(structure="intact"), problem.lattice.spacing)
+    return on_lattice(response.sel(structure="intact"), problem.lattice)
 
 
 def relative_error(problem: Problem, response: xr.Dataset) -> xr.DataArray:

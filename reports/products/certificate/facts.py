@@ -28,7 +28,9 @@ def certificate_facts(found: CertifiedDesign) -> list[Fact]:
 def _family(of: xr.Dataset) -> Iterator[Fact]:
     losses = of["loss"]
     mean, worst = float(losses.mean()), float(losses.max())
-    yield _told("loads", of.sizes["load"])
+    lost = int(losses.isnull().sum())
+    without = f"; {lost} could not be simulated and count in none of these numbers" if lost else ""
+    yield _told("loads", of.sizes["load"], without=without)
     yield _told("mean", mean)
     yield _told("share_95", float(losses.quantile(0.95)))
     yield _told("worst_random", worst)

@@ -16,7 +16,7 @@ from pipeline.fabrication.papers import read_bill, read_manifest
 from pipeline.fabrication.parts import STRAIGHT, THIN_WALL
 from pipeline.problem import Problem
 from pipeline.runtime import cli
-from reports.page import write_page
+from reports.page import titled, write_page
 from reports.products.fabrication import pictures
 
 TITLES = {
@@ -57,7 +57,7 @@ def report(args: argparse.Namespace) -> None:
             bar.update()
     packages = list(zip(made, args.packages, strict=True))
     values = {
-        "title": f"{asked.title}: what is built",
+        "title": f"{titled(asked, args.problem)}: what is built",
         "lead": "Drawings for the laser cutter, plates for the printer, fixtures and papers.",
         "pens": [(name, colour) for name, colour in pictures.PENS.items() if name != "REFERENCE"],
         "structures": made,

@@ -40,7 +40,7 @@ def test_a_design_on_which_both_laws_agree_is_kept_others_not(study: Path, tmp_p
     second, moved = reconsidered(study, tmp_path, 1.09)
     np.testing.assert_allclose(second["vertices"], first["vertices"], atol=1e-12)
     assert second.sizes["evaluation"] == 1
-    angle, distance = law_comparison.cloak_losses(moved)
+    angle, distance = law_comparison.cloak_losses(moved, (1.0,))
     assert distance == pytest.approx(moved["loss"].sel(structure="cloaked").item(), rel=1e-9)
     assert distance == pytest.approx(angle, rel=1e-9)
     second, moved = reconsidered(study, tmp_path, 1.11)

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -6,9 +7,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from pipeline import problem
+from pipeline.problem.fields import SIM_UNITS
+from pipeline.problem.sections.drives import RotationDrive
 from reports.facts import Fact
+from reports.facts.measures import first_within
 from reports.figures.loading_path import abscissa, curves, facts, measures, snapshot_grid, tables
-from reports.study import StudyResults
+from reports.study import StudyResults, evaluation_count
 from tests.reports.compressed_study import SHIELD, written
 from tests.tables import cases
 
@@ -72,3 +76,44 @@ def test_a_drive_of_the_right_edge_is_named(degrees: tuple[float, ...], labels: 
     found = list(facts.strain_facts(asked.model_copy(update={"drive": drive}), PATH))
     assert [fact.label for fact in found] == labels
     assert [fact.value for fact in found] == pytest.approx([100 * 15.0 / 210.0] * len(found))
+
+
+def test_curves_of_many_cases_stay_on_their_panel(two: StudyResults) -> None:
+    """However long the legend is: of ten entries none was left for them."""
+    asked, response = two.problem, two.response
+    more = xr.concat([response] * 3, "case", data_vars="minimal", coords="minimal")
+    ways = tuple(np.linspace(0.0, np.pi, 6))
+    drive = asked.drive.model_copy(update={"directions": ways, "weights": None})
+    datasets = {
+        "design": two.design,
+        "response": more.assign_attrs(response.attrs),
+    }
+    posed = asked.model_copy(update={"drive": drive})
+    many = replace(two, problem=posed, datasets=datasets)
+    path = abscissa.abscissa_of(many.problem, many.response)
+    made = Figure()
+    curves.measure_panel(made.add_subplot(), many, path, measures.measure_of(many.problem))
+    low, high = made.axes[0].get_ylim()
+    most = max(np.nanmax(line.get_ydata()) for line in made.axes[0].get_lines())
+    assert low <= 0.0 < most < high
+
+
+def test_equal_loads_are_numbered_and_a_clockwise_turn_ascends(two: StudyResults) -> None:
+    alike = two.response.assign_coords(direction=("case", [180.0, 180.0]))
+    names = abscissa.load_names(two.problem, alike)
+    assert names == ("load 1, compression 180°", "load 2, compression 180°")
+    turn = RotationDrive.model_validate(
+        {"kind": "rotation", "units": "right", "amplitude": -0.2}, context=SIM_UNITS
+    )
+    response = two.response.assign_coords(amplitude=("case", [-0.2, -0.2]))
+    path = abscissa.abscissa_of(two.problem.model_copy(update={"drive": turn}), response)
+    assert path.name == "Applied rotation, clockwise"
+    assert path.values[-1] == pytest.approx(np.degrees(0.2))
+
+
+def test_failed_evaluations_count(two: StudyResults) -> None:
+    history = two.design.isel(method=0).isel(evaluation=[0] * 7)
+    history["loss"] = ("evaluation", [1.0, np.nan, np.nan, 0.9, 0.5, 0.1, np.nan])
+    history["violation"] = ("evaluation", [0.0] * 6 + [np.nan])
+    assert evaluation_count(history) == 6
+    assert first_within(history["loss"].values, 0.1, 0.9) == 5

@@ -55,7 +55,11 @@ def changed(study: StudyResults, name: Output, made: xr.Dataset) -> StudyResults
 def test_kinds_of_reports(study: StudyResults, shield: StudyResults, smile: StudyResults) -> None:
     assert kinds.kind_of(study.problem).facts is shielding.shielding_facts
     without = study.problem.model_copy(update={"sweep": None})
-    for problem in (without, shield.problem, smile.problem):
+    assert study.problem.cloak.disc is not None
+    aside = study.problem.cloak.disc.model_copy(update={"centre": (30.0, 30.0)})
+    cloak = study.problem.cloak.model_copy(update={"disc": aside})
+    off_centre = study.problem.model_copy(update={"cloak": cloak})
+    for problem in (without, off_centre, shield.problem, smile.problem):
         assert kinds.kind_of(problem).facts is path_facts.loading_path_facts
 
 
