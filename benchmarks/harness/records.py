@@ -89,7 +89,7 @@ class Measurement:
     def error(self, quantity: str) -> float:
         """Returns the largest error of the values in a column; nan if there is none."""
         found = [error for name, error in self.errors.items() if column(name) == quantity]
-        return max(found, default=NAN)
+        return float(np.max(found)) if found else NAN  # nan where one of them is
 
 
 Measured = Mapping[str, Measurement]

@@ -27,6 +27,7 @@ from pipeline.tracking.frames import (
     has_uneven_intervals,
     import_video,
     load_cell,
+    quarter_turns,
     read_frames,
     read_pictures,
     recording,
@@ -233,6 +234,20 @@ def _design(named: str | None, path: Path, study: Path | None) -> Path:
     return study
 
 
+def readout_of(asked: Recording, video: Path, source: Path) -> float:
+    """Returns the time from the first row of the pictures as they are shown to the last, s.
+
+    Raises:
+        UserError: the camera's rows are columns of theirs.
+    """
+    turns = quarter_turns(video) if asked.readout else 0
+    if turns % 2:
+        what = "the video is shown turned by a quarter, so that the camera's rows are its columns"
+        remedy = "film with the phone held across, or leave readout out"
+        raise UserError(what, file=source, key="readout", value=asked.readout, remedy=remedy)
+    return -asked.readout if turns else asked.readout
+
+
 def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) -> Track:
     """The track of a recording, told about in a line at its end.
 
@@ -249,7 +264,7 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
         asked.turned,
         asked.mirrored,
         asked.exposure,
-        asked.readout,
+        readout_of(asked, video, source),
         clamped_units(design),
         asked.camera == "follows supports",
     )

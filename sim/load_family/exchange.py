@@ -1,9 +1,9 @@
 """Minimises the worst loss over a family of loads, by a set of loads that grows.
 
 The design is optimised for a set of loads; then the worst load for it is searched among all of the
-family, and joins the set; loads that do no harm leave it. Both alternate until no load is found
-that is much worse than those in the set (a semi-infinite programme, solved by exchange: Hettich and
-Kortanek 1993, SIAM Rev. 35, 380).
+family, and joins the set; loads that do no harm leave it. Both alternate until all evaluations are
+used; while no load is found that is much worse than those in the set, descents are longer (a
+semi-infinite programme, solved by exchange: Hettich and Kortanek 1993, SIAM Rev. 35, 380).
 """
 
 import logging
@@ -174,7 +174,7 @@ def minimise_worst(
     constraints = constraints_of(scene, make_plan(scene), limits)
     x = np.zeros(scene.space.n_variables) if start is None else start
     history: list[Evaluation] = []
-    best: tuple[float, Result] | None = None
+    best: tuple[float, bool, Result] | None = None
 
     def record(evaluation: Evaluation) -> None:
         history.append(replace(evaluation, number=len(history)))
@@ -196,14 +196,15 @@ def minimise_worst(
         LOG.info("worst of %d loads %.5g, found %.5g", len(held.places), known, found[0].loss)
         worst, mean = max(known, found[0].loss), float(scene.loads.case_weights @ own)
         merit = (1 - options.nominal) * worst + options.nominal * mean
-        if best is None or merit < best[0]:
-            best = merit, replace(result, best=first + result.best)
         stands = found[0].loss <= FOUND * known
+        if best is None or merit < best[0]:
+            best = merit, stands, replace(result, best=first + result.best)
         held.exchange(added, found)
     assert best is not None
-    if not stands:
+    _, stood, result = best
+    if not stood:
         LOG.warning("the worst load found is more than %g times those designed for", FOUND)
-    return replace(best[1], evaluations=tuple(history))
+    return replace(result, evaluations=tuple(history))
 
 
 def without_copies(family: LoadFamily, scene: Scene) -> LoadFamily:

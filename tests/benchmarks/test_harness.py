@@ -51,6 +51,8 @@ def test_methods_run_in_turn(toy: tuple[list[Measurement], list[str]]) -> None:
 
 
 def test_measured_times_errors_work_and_memory(toy: tuple[list[Measurement], list[str]]) -> None:
+    lost = Measurement("one", cpu_s=(1.0,), errors={"loss@0": 1e-6, "loss@5": np.nan})
+    assert np.isnan(lost.error("loss"))
     one = Measurement("one", cpu_s=(4.0, 8.0, 6.0))
     assert [one.seconds, one.spread] == pytest.approx([6.0, 1 / 3])
     found = errors({"u": np.array([3.0, 4.4]), "extra": np.ones(1)}, {"u": np.array([3.0, 4.0])})

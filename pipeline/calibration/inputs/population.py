@@ -100,14 +100,14 @@ class Sampling(Section):
     """Effort of the sampler.
 
     Attributes:
-        chains: of every fit.
+        chains: of every fit, two or more, by which their agreement is told.
         warm_up: steps of each that are not kept.
         draws: that are.
         simulated_sets: sets of samples on which the band is tried, a chain each.
         simulated_draws: steps of each that are kept, after as many that are not.
     """
 
-    chains: Count = 2
+    chains: Samples = 2
     warm_up: Count = 300
     draws: Samples = 600
     simulated_sets: Count = 200
@@ -158,6 +158,9 @@ class Population(Section):
                 "give tests of two samples or more; one alone is for python -m pipeline calibrate"
             )
             raise fault("one sample tells nothing of the others", remedy, "data")
+        if self.predict.test not in {each.test for each in self.data}:
+            remedy = "give sets of that kind, or predict a test of another"
+            raise fault(f"no set of data is of the kind {self.predict.test}", remedy, "predict")
         if seen := set(self.predict.samples) & set(self.samples):
             remedy = "predict a sample that no set of data is of"
             raise fault(f"the sample {min(seen)} is part of the fit", remedy, "predict")

@@ -23,6 +23,12 @@ class SampleCurve(NamedTuple):
     displacement: Floats  # (n,) mm
     force: Floats  # (n,) N
 
+    def ascending(self, points: int) -> Self:
+        """Averages a curve that goes to and fro, or starts at zero, at so many displacements."""
+        if self.displacement[0] > 0.0 and (np.diff(self.displacement) > 0.0).all():
+            return self
+        return self.thinned(float(self.displacement.max()), points)
+
     def thinned(self, end: float, points: int) -> Self:
         """Averages what was read about each of so many even displacements up to `end`, mm.
 

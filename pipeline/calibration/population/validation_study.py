@@ -83,7 +83,8 @@ def validate_population(asked: Population, folder: Path) -> xr.Dataset:
     readings, names = stack_readings(curves, emulators, asked.samples, asked.points)
     posteriors = _fits(asked, begin.logs(ELASTIC_NAMES), readings, names)
     found = FittedPopulation(asked, curves, emulators, predicted, readings, names, posteriors)
-    at = np.linspace(float(measured.displacement.min()), end, POINTS)
+    shown = measured.ascending(POINTS)
+    at = np.linspace(shown.displacement[0], shown.displacement[-1], POINTS)
     kinds = list(emulators)
     curve = pose_curve(predicted, at, kinds.index(asked.predict.test))
     middle, centre = medians(posteriors[""]), begin.logs(ELASTIC_NAMES)
@@ -91,7 +92,7 @@ def validate_population(asked: Population, folder: Path) -> xr.Dataset:
     for name, given in (("", asked.priors), ("doubled", asked.priors.doubled)):
         drawn = redraw_population(posteriors[name], prior_numbers(given, centre), random)
         bands[name] = find_band(new_curves(curve, drawn, random))
-    truth = np.log(np.interp(at, measured.displacement, measured.force))
+    truth = np.log(np.interp(at, shown.displacement, shown.force))
     ranked = _ranked(found, begin, curve, truth - bands[""].median)
     priors = prior_numbers(asked.priors, centre)
     covered = try_band(readings, priors, curve, middle, asked.sampling)

@@ -141,6 +141,9 @@ def loads_in_ranges(problem: Problem) -> Findings:
     if objective.snap == "avoid":
         what = "loads in ranges have no one path to keep from snapping"
         yield ProblemFault(what, ("objective", "snap"), "leave out one of the two")
+    if problem.optimiser.descents > 1:
+        what = "descents under loads in ranges end with loads of their own, and cannot be compared"
+        yield ProblemFault(what, ("optimiser", "descents"), "give 1")
     if problem.optimiser.methods.mma is not None:
         what = "the worst of many loads is minimised by sqp alone"
         yield ProblemFault(what, ("optimiser", "methods", "mma"), "leave it out (a preset: null)")

@@ -30,6 +30,9 @@ def read(path: Path, cell: LoadCellLog) -> ForceLog:
     """
     columns, dimensions = (cell.time, cell.force), (units.TIME, units.FORCE)
     clock, force = csv_columns.read_columns(path, columns, dimensions).T
+    if len(clock) < 2:
+        remedy = "give a log of the whole test"
+        raise UserError("the log has one line", file=path, key=cell.force, remedy=remedy)
     if (np.diff(clock) <= 0).any():
         remedy = "sort it by time, each time once"
         raise UserError("the log's time does not ascend", file=path, key=cell.time, remedy=remedy)

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import cast
 
@@ -93,7 +94,8 @@ def read_frames(
         remedy = "add how many were taken in a second, such as frame_rate: '30 Hz'"
         raise UserError("pictures have no times", file=path, key="frame_rate", remedy=remedy)
     shown = _pictured(path, rate)
-    yield from _even(path, (frame for frame in shown if start <= frame.time <= end))
+    inside = takewhile(lambda frame: frame.time <= end, shown)
+    yield from _even(path, (frame for frame in inside if start <= frame.time))
 
 
 def frame_count(path: Path) -> int:
@@ -249,8 +251,27 @@ def _promised(container: av.container.InputContainer, stream: av.VideoStream, ra
 
 def _upright(image: Picture, rotation: float) -> Picture:
     """Turns the brightness as players show it: a phone tells how it was held."""
-    quarters = round(rotation / 90)
+    quarters = _quarters(rotation)
     return cast("Picture", np.ascontiguousarray(np.rot90(image, quarters))) if quarters else image
+
+
+def _quarters(rotation: float) -> int:
+    return round(rotation / 90) % 4
+
+
+def quarter_turns(video: Path) -> int:
+    """Reads by how many quarter turns, counter-clockwise, frames are turned as they are read.
+
+    A file that cannot be read has none: reading its frames tells what is wrong.
+    """
+    if not video.is_file():
+        return 0
+    try:
+        with _opened(video) as container:
+            frame = next(iter(container.decode(container.streams.video[0])), None)
+            return 0 if frame is None else _quarters(frame.rotation)
+    except (av.FFmpegError, IndexError, UserError):
+        return 0
 
 
 def _brightness(frame: av.VideoFrame) -> Picture:

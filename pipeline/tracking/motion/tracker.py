@@ -49,7 +49,7 @@ class Shutter(NamedTuple):
     """Holds the shutter of a camera."""
 
     exposure: float | None = None  # of a row, s; without it, the first quick motions tell
-    readout: float = 0.0  # from the first row to the last, s
+    readout: float = 0.0  # from the first row to the last, s; negative where these are upside down
     noise: float = 0.0  # residuals to expect of the sensor's noise, levels
 
 

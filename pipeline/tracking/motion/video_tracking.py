@@ -118,7 +118,7 @@ def track_video(
     near = uncertainty.nearest(specimen.centre)
     rest = count_at_rest(motion[: shown.averaged, :, :2].astype(float), near)
     missed = np.zeros_like(motion)
-    if setup.readout or exposure:
+    if (setup.readout or exposure) and can_interpolate(time):
         late = row_times(motion, specimen, calibration, setup)
         bend = exposure**2 / 24 * shares[..., _OF_DOF]
         motion, sigmas, missed = at_frame_times(motion, sigmas, time, late, bend, near, rest)
@@ -244,6 +244,17 @@ def _track_frames(
             raise
         return rows, error
     return rows, None
+
+
+def can_interpolate(time: Floats) -> bool:
+    """Tells whether times (frames,), s, ascend, as between frames; warns where they do not."""
+    ascends = bool((np.diff(time) > 0.0).all())
+    if not ascends:
+        LOG.warning(
+            "several frames have one time: rows count as read at that of their frame, and exposure"
+            " as short; copy the video again"
+        )
+    return ascends
 
 
 def _same(before: Picture, image: Picture) -> bool:

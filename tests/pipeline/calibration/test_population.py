@@ -181,3 +181,15 @@ def test_priors_are_doubled_in_their_logarithms(asked: Population) -> None:
     np.testing.assert_allclose(doubled.constants, 2 * np.asarray(plain.constants))
     np.testing.assert_allclose(doubled.wide, 2 * np.asarray(plain.wide))
     np.testing.assert_allclose(doubled.medians, plain.medians)
+
+
+def test_a_record_that_goes_to_and_fro_is_averaged() -> None:
+    """Cycles from zero on: their force at a displacement is the mean of the cycles'."""
+    way = np.linspace(0.0, 2.0, 201)
+    cycles = SampleCurve("c", "compression", ("s9",), np.tile(way, 3), np.tile(3.0 * way, 3))
+    shown = cycles.ascending(20)
+    assert shown.displacement[0] > 0.0
+    assert (np.diff(shown.displacement) > 0.0).all()
+    np.testing.assert_allclose(shown.force, 3.0 * shown.displacement, rtol=1e-9)
+    once = cycles._replace(displacement=way[1:], force=way[1:])
+    assert once.ascending(20) is once

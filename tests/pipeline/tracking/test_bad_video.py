@@ -10,11 +10,14 @@ import pytest
 
 from benchmarks.tracking.rendering import write_video
 from pipeline.runtime import UserError
+from pipeline.stages.track import readout_of
 from pipeline.tracking.detect import orientation_text
 from pipeline.tracking.frames import (
     BrokenOffError,
     Frame,
+    Recording,
     import_video,
+    quarter_turns,
     read_frames,
     read_pictures,
 )
@@ -22,6 +25,7 @@ from pipeline.tracking.geometry import outlines_of_design
 from pipeline.tracking.motion import Track, track_video
 from tests.pipeline.tracking.conftest import CLIPS
 from tests.pipeline.virtual_lab.conftest import GRID, film_of
+from tests.tables import refused
 
 SCALE = 1 / 0.365
 WIDTH = 320
@@ -111,6 +115,23 @@ def test_a_phone_s_video_is_shown_upright(tmp_path: Path) -> None:
     phone = tmp_path / "phone.mp4"
     phone.write_bytes(held)
     np.testing.assert_array_equal(next(read_frames(phone)).image, np.rot90(plain, -1))
+    assert quarter_turns(CLIPS / "f_silhouette.mp4") == 0
+    assert quarter_turns(phone) == 3
+    given = {"video": "phone.mp4", "structure": "cloaked", "readout": "20 ms"}
+    asked = Recording.model_validate(given)
+    with refused("the camera's rows are its columns", "readout"):
+        readout_of(asked, phone, tmp_path / "phone.yaml")
+    held[matrix : matrix + 36] = struct.pack(">9i", -one, 0, 0, 0, -one, 0, 0, 0, 1 << 30)
+    phone.write_bytes(held)
+    assert readout_of(asked, phone, tmp_path / "phone.yaml") == -0.02
+
+
+def test_pictures_behind_the_window_are_not_read(tmp_path: Path, clip: list[np.ndarray]) -> None:
+    for number, image in enumerate(clip):
+        assert cv2.imwrite(str(tmp_path / f"a{number}.png"), image)
+    (tmp_path / f"a{len(clip) - 1}.png").write_bytes(b"nothing")
+    shown = list(read_frames(tmp_path, rate=10.0, end=0.1))
+    assert [frame.index for frame in shown] == [0, 1]
 
 
 def test_a_file_that_breaks_off_is_read_as_far_as_it_goes(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ import pytest
 
 from pipeline.tracking.motion.prediction import latest_velocity
 from pipeline.tracking.motion.time_interpolation import at_frame_times, middle_speed
+from pipeline.tracking.motion.video_tracking import can_interpolate
 
 RATE, PACE, NOISE = 30.0, 15.0, 0.002
 UNITS = 200
@@ -55,3 +56,10 @@ def test_velocities_are_those_of_the_polynomial_through_the_frames_seen() -> Non
     motion = np.stack([swing(time), 0 * time, 0 * time], axis=-1)[:, None]
     assert middle_speed(motion, time, 4)[0] == pytest.approx(abs(2 * PACE * np.cos(2.0)), rel=1e-3)
     assert np.isnan(middle_speed(motion, time, 2)).all()
+
+
+def test_frames_of_one_time_are_told(caplog: pytest.LogCaptureFixture) -> None:
+    assert can_interpolate(np.array([0.0, 0.1, 0.3]))
+    assert not caplog.text
+    assert not can_interpolate(np.array([0.0, 0.1, 0.1, 0.5]))
+    assert "several frames have one time" in caplog.text

@@ -7,6 +7,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from pipeline import problem
+from pipeline.problem import Output
 from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.sections.drives import RotationDrive
 from reports.facts import Fact
@@ -84,7 +85,7 @@ def test_curves_of_many_cases_stay_on_their_panel(two: StudyResults) -> None:
     more = xr.concat([response] * 3, "case", data_vars="minimal", coords="minimal")
     ways = tuple(np.linspace(0.0, np.pi, 6))
     drive = asked.drive.model_copy(update={"directions": ways, "weights": None})
-    datasets = {
+    datasets: dict[Output, xr.Dataset] = {
         "design": two.design,
         "response": more.assign_attrs(response.attrs),
     }
@@ -94,7 +95,8 @@ def test_curves_of_many_cases_stay_on_their_panel(two: StudyResults) -> None:
     made = Figure()
     curves.measure_panel(made.add_subplot(), many, path, measures.measure_of(many.problem))
     low, high = made.axes[0].get_ylim()
-    most = max(np.nanmax(line.get_ydata()) for line in made.axes[0].get_lines())
+    drawn = [np.asarray(line.get_ydata(), dtype=float) for line in made.axes[0].get_lines()]
+    most = max(float(np.nanmax(curve)) for curve in drawn if curve.size)
     assert low <= 0.0 < most < high
 
 
