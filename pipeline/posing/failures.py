@@ -83,12 +83,12 @@ class StoppedError(Exception):
         scene, error, place = self.scene, self.error, ""
         if scene.loads.static and error.step is not None:
             reached = 0.0 if error.step == 0 else float(self.asked[error.step - 1])
-            place = f"{reached / scene.loads.duration:.0%} of the load"
+            share = f"{reached / scene.loads.duration:.0%} of the load"
+            place = f" beyond {share}"
             if all(case.control is None for case in scene.loads.cases):
                 laws = [np.asarray(law(np.array([reached]))) for law in scene.loads.motions]
                 length = max(float(np.linalg.norm(law[..., :2], axis=-1).max()) for law in laws)
-                place = f"a driven displacement of {length:.3g} mm ({place})"
-            place = f" beyond {place}"
+                place = f" beyond a driven displacement of {length:.3g} mm ({share})"
         if error.unit is not None:
             i, j = scene.lattice.index[error.unit]
             place += f", look at unit [{i}, {j}]"
