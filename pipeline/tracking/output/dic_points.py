@@ -7,6 +7,7 @@ import numpy as np
 import shapely
 import xarray as xr
 from pydantic import Field
+from scipy.spatial import cKDTree
 
 from pipeline.datasets.tables import TABLES
 from pipeline.problem.fields import Angle, Coordinate, Section, csv_columns, units
@@ -23,6 +24,8 @@ from sim.core import Floats, Ints
 
 _FINEST = 1e-4  # mm, standard deviation of the best points
 _LEAST = 3  # points of a unit
+_STRAY = 4.0  # of a usual error, from which on a point counts as gone astray
+_MOST_ALIKE = 0.95  # correlation of neighbours that is told from one
 
 ColumnName = Annotated[str, Field(min_length=1)]
 
@@ -114,7 +117,8 @@ def track(design: xr.Dataset, seen: DicPoints) -> xr.Dataset:
     """Makes the dataset ``track`` of points: a robust rigid fit for each unit and time.
 
     A unit's motion is taken from the points that lie on it at rest. Its uncertainty follows from
-    how far they are from moving rigidly.
+    how far they are from moving rigidly, and from how alike these errors are in neighbours: a DIC
+    system's subsets overlap.
 
     Args:
         design: as built.
@@ -140,12 +144,31 @@ def track(design: xr.Dataset, seen: DicPoints) -> xr.Dataset:
     order = np.lexsort((unit, frame))
     order = order[unit[order] >= 0]
     key = frame[order] * specimen.count + unit[order]
+    alike = np.zeros(2)  # sums of products of errors with those of neighbours, and of squares
     for rows in np.split(order, np.flatnonzero(np.diff(key)) + 1):
         if len(rows) >= _LEAST:
             at = frame[rows[0]], unit[rows[0]]
             before = seen.place[rows] - specimen.centre[unit[rows[0]]]
-            motion[at], sigma[at] = _fitted(before, before + seen.moved[rows])
+            motion[at], sigma[at], rest = _fitted(before, before + seen.moved[rows])
+            alike += _neighbours(before, rest)
+    sigma *= np.sqrt(_points_alike(alike[0] / max(alike[1], _FINEST**2)))
     return _dataset(design, time - time[0], motion, sigma)
+
+
+def _neighbours(place: Floats, rest: Floats) -> Floats:
+    """Sums errors (n, 2) of points (n, 2) times those of the nearest others, and their squares."""
+    near = cKDTree(place).query(place, k=2)[1][:, 1]
+    sound = (rest**2).sum(axis=1) < _STRAY**2 * np.median((rest**2).sum(axis=1))
+    pairs = sound & sound[near]
+    return np.array([(rest[pairs] * rest[near][pairs]).sum(), (rest[pairs] ** 2).sum()])
+
+
+def _points_alike(correlation: float) -> float:
+    """Counts the points whose errors are one, of neighbours with that correlation.
+
+    Subsets m steps wide share 1 - 1 / m of their pixels with the next, and each of m^2 some.
+    """
+    return (1.0 - np.clip(correlation, 0.0, _MOST_ALIKE)) ** -2.0
 
 
 def _bearer(specimen: SpecimenOutlines, place: Floats) -> Ints:
@@ -160,8 +183,11 @@ def _bearer(specimen: SpecimenOutlines, place: Floats) -> Ints:
     return out
 
 
-def _fitted(before: Floats, after: Floats) -> tuple[Floats, Floats]:
-    """Fits pose and standard uncertainty (3,) to points relative to the centroid at rest."""
+def _fitted(before: Floats, after: Floats) -> tuple[Floats, Floats, Floats]:
+    """Fits pose and standard uncertainty (3,) to points relative to the centroid at rest.
+
+    Also returns what is left of each point's motion (n, 2).
+    """
     turn, shift, weight = robust_motion(before, after, _FINEST)
     rest = after - before @ rotation_matrix(-turn) - shift
     count = weight.sum()
@@ -171,7 +197,7 @@ def _fitted(before: Floats, after: Floats) -> tuple[Floats, Floats]:
     variance = max(float(weight @ (rest**2).sum(axis=1)) / freedom, _FINEST**2)
     lever = middle[::-1] ** 2  # the centroid lies aside from the middle of the points
     place = variance * (1 / count + lever / arm)
-    return np.array([*shift, turn]), np.sqrt([*place, variance / arm])
+    return np.array([*shift, turn]), np.sqrt([*place, variance / arm]), rest
 
 
 def _dataset(design: xr.Dataset, time: Floats, motion: Floats, sigma: Floats) -> xr.Dataset:

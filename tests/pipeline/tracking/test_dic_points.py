@@ -9,6 +9,7 @@ from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.tracking.frames import import_video
 from pipeline.tracking.geometry import outlines_of_design
+from pipeline.tracking.output.dic_points import DicPoints, track
 from tests.pipeline.conftest import Failing
 from tests.pipeline.virtual_lab.conftest import GRID
 from tests.tables import cases
@@ -70,3 +71,25 @@ def test_points_that_do_not_fit_are_refused(
     path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
     words = ["points", str(path), "--out", str(path.with_name("track.nc"))]
     assert told in failing("track", words)
+
+
+@pytest.mark.parametrize("overlap", [1, 3, 5])
+def test_sigma_holds_where_subsets_overlap(overlap: int) -> None:
+    """Each point is the mean of as many patches of white noise either way; its neighbours share."""
+    design = import_video.design(SMALL)
+    specimen = outlines_of_design(design)
+    random, side, frames = np.random.default_rng(3), 9, 30
+    grid = np.stack(np.meshgrid(*[np.linspace(-3.0, 3.0, side)] * 2), axis=-1).reshape(-1, 2)
+    place = (specimen.centre[:, None] + grid).reshape(-1, 2)
+    white = random.normal(size=(frames, 16, side + overlap - 1, side + overlap - 1, 2))
+    patches = np.lib.stride_tricks.sliding_window_view(white, (overlap, overlap), axis=(2, 3))
+    noise = NOISE * overlap * patches.mean(axis=(-2, -1)).reshape(frames, -1, 2)
+    seen = DicPoints(
+        np.repeat(np.arange(float(frames)), len(place)),
+        np.tile(place, (frames, 1)),
+        noise.reshape(-1, 2),
+    )
+    made = track(design, seen)
+    ratio = np.sqrt(np.mean((made["displacement"].values / made["sigma"].values) ** 2, axis=(0, 1)))
+    assert (ratio > 0.6).all()
+    assert (ratio < 1.5).all()
