@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
-from pipeline.calibration.fit_uncertainty import Uncertainty, slopes
+from pipeline.calibration.fit_uncertainty import Uncertainty, invert_information, slopes
 from pipeline.calibration.inputs import ConstantName, Constants
 from pipeline.calibration.least_squares import Fit
 from sim.core import Floats, Ints
@@ -17,6 +17,8 @@ WEAK_FROM, NOTHING_FROM = 0.1, 1.0
 TOLD_APART = 30.0
 """Condition number from which constants are hardly told apart."""
 CONVERGED = 0.05
+_MANY = 1e6
+"""Freedom from which Student's distribution is the normal one."""
 DERIVED: tuple[ConstantName, ...] = ("damping_translation", "damping_rotation")
 """What follows from a damping ratio by the authors' law."""
 
@@ -63,7 +65,7 @@ def estimate_constants(fit: Fit, known: Uncertainty) -> Estimate:
     covariance = turn @ known.covariance @ turn.T
     error, bound = (np.sqrt(np.diag(each)) for each in (covariance, turn @ known.least @ turn.T))
     here = fit.model.constants(fit.unknowns)
-    reach = _quantile(fit) * error
+    reach = _quantiles(fit, turn) * error
     low, high = (_values(here, every, here.logs(every) + sign * reach) for sign in (-1, 1))
     values = np.array([here.value(name) for name in every])
     status = np.where(error > WEAK_FROM, WEAK, DETERMINED)
@@ -86,24 +88,38 @@ def _values(here: Constants, names: Sequence[ConstantName], logs: Floats) -> Flo
     return barrier + np.exp(np.minimum(logs, 300.0))
 
 
-def _quantile(fit: Fit) -> float:
-    """Computes the quantile of the 95 % intervals: Student's, where the noise was estimated."""
-    experiments = fit.model.experiments
-    if all(each.measured.known for each in experiments):
-        return float(ndtri(0.975))
-    unbiased = sum(each.measured.unbiased for each in experiments)
-    return float(stdtrit(max(len(fit.residual) - len(fit.unknowns) - unbiased, 1), 0.975))
+def _quantiles(fit: Fit, turn: Floats) -> Floats:
+    """Computes quantiles (n,) of the 95 % intervals: Student's, where noise was estimated.
+
+    `turn` (n, n_names) are the slopes of the values' logarithms by those fitted. A variance is the
+    sum of those V_k that the sets leave, each known by its own freedom f_k, and has that of Welch
+    and Satterthwaite (1946, Biometrics 2, 110): f = (sum V_k)^2 / sum (V_k^2 / f_k).
+    """
+    way = turn @ invert_information(fit.jacobian)[: turn.shape[1]]
+    rows, spread = fit.model.set_of_row, (fit.jacobian @ way.T) ** 2
+    variance, doubt = np.zeros((2, len(turn)))
+    for k, (each, left) in enumerate(zip(fit.model.experiments, _freedom(fit), strict=True)):
+        part = spread[rows == k].sum(axis=0)
+        variance += part
+        doubt += 0.0 if each.measured.known else part**2 / max(left, 1.0)
+    freedom = variance**2 / np.maximum(doubt, 1e-12 * variance**2)
+    return np.where(freedom < _MANY, stdtrit(np.maximum(freedom, 1.0), 0.975), ndtri(0.975))
+
+
+def _freedom(fit: Fit) -> Floats:
+    """Computes what the fit leaves of the sets' freedom (n_sets,)."""
+    basis = np.linalg.svd(fit.jacobian, full_matrices=False)[0]
+    taken, rows = (basis**2).sum(axis=1), fit.model.set_of_row
+    means = [each.measured.unbiased for each in fit.model.experiments]
+    return np.array([(1 - taken[rows == k]).sum() - mean for k, mean in enumerate(means)])
 
 
 def measure_quality(fit: Fit) -> Quality:
     """Measures how well the fit explains each set."""
-    basis = np.linalg.svd(fit.jacobian, full_matrices=False)[0]
-    taken, rows = (basis**2).sum(axis=1), fit.model.set_of_row
-    sets = range(len(fit.model.experiments))
-    means = [each.measured.unbiased for each in fit.model.experiments]
+    rows, sets = fit.model.set_of_row, range(len(fit.model.experiments))
     return Quality(
         points=np.array([(rows == k).sum() for k in sets]),
-        freedom=np.array([(1 - taken[rows == k]).sum() - means[k] for k in sets]),
+        freedom=_freedom(fit),
         chi_square=np.array([(fit.residual[rows == k] ** 2).sum() for k in sets]),
         level=fit.level,
         autocorrelation=np.array([_autocorrelation(fit.residual[rows == k], fit, k) for k in sets]),
