@@ -59,7 +59,7 @@ def cases(preset: str | None, count: float, _: str = "loss") -> Run:
     of_case(every[0])
 
     def run() -> Sample:
-        losses = [of_case(setting)[0].loss for setting in every]
+        losses = [of_case(setting)[0][0].loss for setting in every]
         return Sample({"loss": np.array(losses[:1])}, {"cases": len(losses)})
 
     return run

@@ -19,7 +19,7 @@ import numpy as np
 from pipeline.calibration import moved_parts
 from pipeline.calibration.inputs import KnownPictures
 from pipeline.problem.reading import load_section
-from pipeline.tracking.frames import read_picture
+from pipeline.tracking.frames import read_pictures
 from pipeline.tracking.geometry import rigid_motion, rotation_matrix
 from pipeline.tracking.motion import Patch, find_motion, fit_motion
 from sim.core import Floats
@@ -50,10 +50,11 @@ def patches(folder: Path = IMAGES, pictures: Path = PICTURES) -> Iterator[KnownP
     for row in rows:
         numbers = np.array(row["patch"].removeprefix("polygon ").split(), float).reshape(-1, 2)
         motion = np.array([row["u_px"], row["v_px"], row["rotation_rad"]], float)
-        after = read_picture(folder / f"{Path(row['image']).stem}.png")
-        patch = Patch(read_picture(folder / "pc_ref.png"), after, numbers, np.array([250.0, 250.0]))
+        names = "pc_ref", Path(row["image"]).stem
+        before, after = read_pictures(*(folder / f"{name}.png" for name in names))
+        patch = Patch(before, after, numbers, np.array([250.0, 250.0]))
         yield KnownPatch("part, steps of 30 deg", patch, motion)
-    before, after = (read_picture(folder / f"rotation_{turn}.png") for turn in ("000", "170"))
+    before, after = read_pictures(*(folder / f"rotation_{turn}.png" for turn in ("000", "170")))
     turn = np.deg2rad(-170.0)
     for x, y in ((256, 256), (200, 180), (320, 200), (190, 330), (330, 310)):
         there = np.array([x, y], float)
@@ -61,7 +62,7 @@ def patches(folder: Path = IMAGES, pictures: Path = PICTURES) -> Iterator[KnownP
         patch = Patch(before, after, _square(x, y), there)
         yield KnownPatch("pair turned by 170 deg", patch, np.append(shift, turn))
     names = ("Reference", "P200_K50_N2")
-    before, after = (read_picture(folder / f"challenge15_{name}.png") for name in names)
+    before, after = read_pictures(*(folder / f"challenge15_{name}.png" for name in names))
     for rows_, v in (((60, 110), -9.57125), ((850, 910), 0.0)):
         for y in rows_:
             for x in range(60, 560, 60):

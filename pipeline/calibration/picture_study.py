@@ -11,7 +11,7 @@ from pipeline.calibration.inputs import KnownPictures, RigidParts, SpecimenPictu
 from pipeline.problem.fields import csv_columns
 from pipeline.runtime import UserError
 from pipeline.tracking.detect import detect_lattice
-from pipeline.tracking.frames import read_picture
+from pipeline.tracking.frames import read_picture, read_pictures
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion import Patch, follow_patch
 from sim.core import Floats
@@ -37,7 +37,6 @@ def moved_parts(asked: RigidParts, folder: Path) -> Iterator[MovedPart]:
     """
     place = folder / asked.folder
     table = place / asked.reference
-    before = read_picture(place / asked.first)
     pictures = {_number(path): path for path in sorted(place.glob("*.png"))}
     first = _number(place / asked.first)
     for frame, part, *motion in csv_columns.read_columns(table, asked.columns):
@@ -48,7 +47,7 @@ def moved_parts(asked: RigidParts, folder: Path) -> Iterator[MovedPart]:
             remedy = "delete the line, add the picture, or describe the part"
             raise UserError(what, file=table, value=f"{frame:g}, {part:g}", remedy=remedy)
         one = asked.parts[int(part)]
-        after = read_picture(pictures[int(frame)])
+        before, after = read_pictures(place / asked.first, pictures[int(frame)])
         patch = Patch(before, after, np.array(one.outline), np.array(one.centre))
         yield MovedPart(int(frame), int(part), patch, np.array(motion))
 

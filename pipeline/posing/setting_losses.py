@@ -1,7 +1,7 @@
 """Simulates the losses of the altered structure and of a design in one problem."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +27,10 @@ class UnposedError(ValueError):
 
 def results(
     asked: Problem, setting: Setting, folder: Path, design: xr.Dataset, threads: int
-) -> list[SweepResult]:
+) -> tuple[list[SweepResult], tuple[float, ...]]:
     """Simulates every load case of a problem, its files in `folder`, with a setting laid over it.
+
+    Also returns the weights of the load cases, which add up to 1.
 
     Raises:
         UnposedError: the setting makes no problem, or one that the design does not fit.
@@ -51,13 +53,14 @@ def results(
     altered, cloaked = (
         _simulated(structures[name], target, threads) for name in ("altered", "cloaked")
     )
-    return [_found(*pair) for pair in zip(altered, cloaked, strict=True)]
+    found = [_found(*pair) for pair in zip(altered, cloaked, strict=True)]
+    return found, problem.drive.case_weights
 
 
-def mean(found: list[SweepResult], weights: Floats) -> SweepResult:
+def mean(found: list[SweepResult], weights: Sequence[float]) -> SweepResult:
     """Joins several load cases into one: their losses weighted, their smallest void angle."""
     numbers = np.array([each[:-1] for each in found])
-    loss, altered = weights @ numbers[:, :2]
+    loss, altered = np.asarray(weights) @ numbers[:, :2]
     status = next((each.status for each in found if each.status != "ok"), "ok")
     return SweepResult(float(loss), float(altered), float(numbers[:, 2].min()), status)
 

@@ -73,8 +73,8 @@ def trials(
         found[check] = _numbers(others, _as_posed(others, times), as_run, times)
         status[check] = "ok"
     except StoppedError as stopped:
-        LOG.warning("%s: %s", check, stopped)
-        status[check] = str(stopped)
+        status[check] = f"{stopped.name}: {stopped}"
+        LOG.warning("%s: %s", check, status[check])
     return found, status
 
 

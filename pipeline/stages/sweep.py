@@ -91,12 +91,14 @@ def _results(
 ) -> list[SweepResult]:
     setting = group.together
     try:
-        found = setting_losses.results(asked, setting, args.problem.parent, design, args.threads)
+        found, weights = setting_losses.results(
+            asked, setting, args.problem.parent, design, args.threads
+        )
     except (setting_losses.UnposedError, SimulationError) as error:
         return [SweepResult.failed(str(error))] * len(group.numbers)
     if sweep_cases.names_directions(setting):
         return found
-    return [setting_losses.mean(found, np.array(asked.drive.case_weights))]
+    return [setting_losses.mean(found, weights)]
 
 
 def dataset(

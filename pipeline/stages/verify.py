@@ -100,8 +100,8 @@ def _finer_loads(
         except StoppedError as stopped:
             if name == AS_RUN:
                 raise
-            LOG.warning("%s: %s", name, stopped)
-            status[name] = str(stopped)
+            status[name] = f"{stopped.name}: {stopped}"
+            LOG.warning("%s: %s", name, status[name])
     as_run = tables[AS_RUN]
     found = {
         name: {

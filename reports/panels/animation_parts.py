@@ -39,8 +39,10 @@ def with_recordings(
 
 
 def case_labels(response: xr.Dataset) -> list[str]:
-    """Returns labels the load cases by their angles."""
-    return [f"α = {angle:g}°" for angle in response["direction"].values]
+    """Labels the load cases by their angles, or by their numbers where these are alike."""
+    labels = [f"α = {angle:g}°" for angle in response["direction"].values]
+    alike = len(set(labels)) < len(labels)
+    return [f"load {k}" for k in range(1, len(labels) + 1)] if alike else labels
 
 
 def time_axis(times: Floats, *, real: bool = False) -> AnimationAxis:

@@ -159,7 +159,7 @@ class Evaluator:
         # (sum v^p / n)^(1/p) of the copies' losses v, and its derivatives (v / value)^(p - 1) / n
         sharpness = self.scene.objective.copy_sharpness
         value = float(combined(values, np.full(len(values), 1 / len(values)), sharpness))
-        shares = (values / value) ** (sharpness - 1.0) / len(values)
+        shares = (values / (value or 1.0)) ** (sharpness - 1.0) / len(values)
         return value, shares @ gradients, each.mean(axis=0)
 
 

@@ -95,8 +95,14 @@ def combined(losses: Numbers, weights: Numbers, sharpness: float) -> Array:
     if sharpness == 1.0:
         return jnp.asarray(weights) @ jnp.asarray(losses)
     largest = jax.lax.stop_gradient(jnp.max(losses))
-    largest = jnp.where(largest > 0.0, largest, 1.0)  # where nothing moves all of them are 0
-    return largest * (jnp.asarray(weights) @ (losses / largest) ** sharpness) ** (1.0 / sharpness)
+    return p_mean(losses, largest, jnp.asarray(weights), sharpness)
+
+
+def p_mean(values: Numbers, largest: Numbers, weights: Numbers, sharpness: float) -> Array:
+    """Takes the weighted p-mean of values, scaled by the largest; 0 with no slope if that is 0."""
+    some = largest > 0.0
+    total = weights @ (values / jnp.where(some, largest, 1.0)) ** sharpness
+    return jnp.asarray(largest) * jnp.where(some, total, 1.0) ** (1.0 / sharpness)
 
 
 def scales(spacing: float) -> Floats:

@@ -21,6 +21,7 @@ from sim.quasistatics import (
     lowest_eigenpair,
     softest_point,
 )
+from sim.scene.objectives import p_mean
 from sim.scene.parameter_map import parameters_of_design
 from sim.scene.plan import Plan
 from sim.scene.scene import Scene
@@ -226,8 +227,8 @@ def _strain_and_slopes(
     def ratio(motion: Array, values: Parameters[Array]) -> Array:
         found = foil_strains(motion[:, ends], values, foil.thickness) / foil.strain
         largest = jax.lax.stop_gradient(jnp.abs(found).max())
-        largest = jnp.where(largest > 0.0, largest, 1.0)  # where nothing moves
-        return largest * ((found / largest) ** SHARPNESS).sum() ** (1.0 / SHARPNESS)
+        ratios = found.ravel()
+        return p_mean(ratios, largest, jnp.ones_like(ratios), SHARPNESS)
 
     return jax.jit(jax.value_and_grad(ratio, argnums=(0, 1)))
 

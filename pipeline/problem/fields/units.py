@@ -24,7 +24,7 @@ centi- = 1e-2 = c-
 kilo- = 1e3 = k-
 mega- = 1e6 = M-
 meter = [length] = m = metre
-second = [time] = s
+second = [time] = s = sec
 gram = [mass] = g
 radian = [angle] = rad
 degree = 0.017453292519943295 * radian = deg = °

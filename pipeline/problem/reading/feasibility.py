@@ -133,6 +133,7 @@ _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     load_checks.units_exist,
     load_checks.drive_is_free,
     load_checks.one_kind_of_load,
+    load_checks.spectrum,
     load_checks.horizon,
     _robust,
     load_checks.reaction,

@@ -78,9 +78,13 @@ def one_kind_of_load(problem: Problem) -> Findings:
         if slow:
             what = f"a {slow[0]} is a slow load, and another of the drives is not"
             yield ProblemFault(what, ("drives",), "give all of them a course in time, or none")
-    displaced = len(kinds) == 1 and isinstance(kinds[0], DisplacementDrive)
-    if problem.spectrum is not None and not displaced:
-        what = f"a spectrum is that of one displacement along a line, not of a {problem.drive.kind}"
+
+
+def spectrum(problem: Problem) -> Findings:
+    """Finds drives to which there is no transmission of a displacement."""
+    if problem.spectrum is not None and not isinstance(problem.drive, DisplacementDrive):
+        kind = "several drives" if isinstance(problem.drive, SeveralDrives) else problem.drive.kind
+        what = f"a spectrum is that of one displacement along a line, not of {kind}"
         yield ProblemFault(what, ("spectrum",), "leave it out, or drive by a displacement")
 
 

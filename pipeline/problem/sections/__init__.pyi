@@ -70,6 +70,7 @@ from .sweep_cases import SettingError as SettingError
 from .sweep_cases import apply_setting as apply_setting
 from .sweep_cases import case_count as case_count
 from .sweep_cases import group_count as group_count
+from .sweep_cases import names_directions as names_directions
 from .virtual_recording import CameraView as CameraView
 from .virtual_recording import Codec as Codec
 from .virtual_recording import Lighting as Lighting

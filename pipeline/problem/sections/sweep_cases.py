@@ -113,7 +113,7 @@ def apply_setting(data: Mapping[str, Any], setting: Setting) -> dict[str, Any]:
     for key, value in setting.items():
         *above, last = _canonical(key, made).split(".")
         section = _section(made, above, key)
-        if last in _DIRECTIONS:
+        if last in _DIRECTIONS and _is_drive(above):
             for name in (*_DIRECTIONS, "weights"):
                 section.pop(name, None)
             section["directions"] = value if isinstance(value, list) else [value]
@@ -130,6 +130,10 @@ def names_directions(setting: Setting) -> bool:
 
 _DIRECTIONS = ("directions", "direction")
 """The key of a drive's directions, and that of a single one, which stands for a list of one."""
+
+
+def _is_drive(names: list[str]) -> bool:
+    return names[-1:] == ["drive"] or names[-2:-1] == ["drives"]
 
 
 def _canonical(key: str, data: Mapping[str, Any]) -> str:

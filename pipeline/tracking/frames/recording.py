@@ -45,8 +45,8 @@ class LoadCellLog(Section):
 
     Attributes:
         file: a CSV with a heading, as seen from the recording's own file.
-        time: name of the column of times, s.
-        force: name of the column of forces, N.
+        time: name of the column of times, in the unit of its heading, or s.
+        force: name of the column of forces, likewise, or N.
         offset: time of the video's first frame on the log's clock, s.
     """
 

@@ -34,10 +34,10 @@ class DicColumns(Section):
     """Names of the columns.
 
     Attributes:
-        time: in s.
-        x: place at rest, mm.
+        time: in the unit of its heading, or s.
+        x: place at rest, likewise, or mm.
         y: likewise.
-        ux: displacement, mm.
+        ux: displacement, likewise, or mm.
         uy: likewise.
     """
 

@@ -38,8 +38,8 @@ RIGHT_AXIS = 9.0
 """Room for the labels of an axis on the right, mm."""
 
 _FLAT = 0.05
-_LINE, _MOST_ROOM = 0.1, 0.6  # of a panel's height: a line of its legend, and all lines at most
 """Share of the altered structure's measure below which a curve is seen on a logarithmic axis."""
+_LINE, _MOST_ROOM = 0.1, 0.6  # of a panel's height: a line of its legend, and all lines at most
 
 
 def path_axes(axes: Axes, path: Abscissa, label: str) -> None:

@@ -48,7 +48,9 @@ def path(study: StudyResults) -> Columns:
     measure = measures.measure_of(problem)
     columns: Columns = {"time_s": response["time"].values}
     if way.static:
-        name = "displacement" if way.displaces else way.name.lower().replace(" ", "_")
+        name = (
+            "displacement" if way.displaces else way.name.lower().replace(",", "").replace(" ", "_")
+        )
         columns[_column(name, way.unit)] = way.values
     answer = drive_response(problem)
     series = {

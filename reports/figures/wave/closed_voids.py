@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem import Problem
-from reports.study import RigidUnits, from_dataset, on_lattice
+from reports.study import RigidUnits, from_dataset
 from sim.core import Floats, Ints, Mask
 
 
@@ -51,7 +51,7 @@ def _angle(start: Floats, end: Floats) -> Floats:
 
 
 def on_edges(structure: RigidUnits) -> Mask:
-    """Tells which ligaments (n_ligaments,) run along the top or the bottom edge."""
+    """Tells which ligaments (n_ligaments,) run along the top or the bottom row of a lattice."""
     height = structure.site[structure.ligament_unit, 1]
     ends = structure.site[:, 1].min(), structure.site[:, 1].max()
     return np.asarray(np.isin(height, ends).all(axis=1) & (np.ptp(height, axis=1) == 0.0))
@@ -65,14 +65,14 @@ def middles(structure: RigidUnits, vertices: Floats) -> Floats:
 
 def along_edges(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     """Finds the smaller void angle (structure, case, time, ligament) along the edges."""
-    whole = on_lattice(response.isel(structure=0), problem.lattice)
+    whole = from_dataset(response.isel(structure=0), problem.lattice.spacing)
     n_edge = int(on_edges(whole).sum())
     angles = np.full(
         (*(response.sizes[dim] for dim in ("structure", "case", "time")), n_edge), np.nan
     )
     for k, name in enumerate(response["structure"].values):
         part = response.sel(structure=name)
-        here = on_edges(on_lattice(part, problem.lattice))
+        here = on_edges(from_dataset(part, problem.lattice.spacing))
         for case in range(response.sizes["case"]):
             found = smaller_angles(problem, part.isel(case=case))[:, here]
             angles[k, case, :, : found.shape[1]] = found

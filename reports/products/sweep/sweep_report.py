@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets, problem
-from pipeline.problem.sections import DIRECTIONS
+from pipeline.problem.sections import names_directions
 from pipeline.runtime import UserError
 from reports.base import Table, prose
 from reports.facts import Fact, grouped, number, share, table
@@ -86,7 +86,8 @@ def tables(data: xr.Dataset) -> list[Table]:
 
 def _counts(data: xr.Dataset, good: xr.Dataset) -> list[Fact]:
     total, left = data.sizes["case"], good.sizes["case"]
-    mean = "" if DIRECTIONS in data["parameter"] else "each the weighted mean of its load cases"
+    alone = names_directions(dict.fromkeys(map(str, data["parameter"].values), 0.0))
+    mean = "" if alone else "each the weighted mean of its load cases"
     return [
         number("cases", "Cases", total, digits=9, note=mean),
         number("failed", "Failed cases", total - left, digits=9, note="below with their reasons"),

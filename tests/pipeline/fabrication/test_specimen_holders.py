@@ -57,6 +57,8 @@ def test_units_of_a_list_are_grouped_by_where_they_are() -> None:
     assert all(edge.along == 0 for edge in edges)
     assert held_edges(left, listed, handmade.SPACING) == ([], left)
     assert np.ptp([unit.design.centroid.y for unit in edges[0].units]) < 1.0
+    corners = [units[n] for n in (0, 2, 3, 5)]
+    assert held_edges(corners, listed, handmade.SPACING) == ([], corners)
 
 
 @pytest.mark.parametrize("name", ["fig4"])

@@ -43,6 +43,7 @@ def study(folder: Path, drive: str, more: str = "") -> Path:
         (ONE, "drive.directions", "135 deg"),
         (SEVERAL, "drives.0.amplitude", "0.2 N"),
         (SEVERAL, "drives.0.direction", "0 deg"),
+        (RAMP, "fabrication.slots.direction", "bisector"),
     ],
 )
 def test_a_setting_is_the_same_over_both_forms(

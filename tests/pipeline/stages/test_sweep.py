@@ -83,7 +83,7 @@ def test_a_killed_sweep_goes_on(
     simulated = []
     results = setting_losses.results
 
-    def counted(*given: object) -> list[SweepResult]:
+    def counted(*given: object) -> tuple[list[SweepResult], tuple[float, ...]]:
         simulated.append(given)
         return results(*given)  # type: ignore[arg-type]
 

@@ -24,7 +24,9 @@ def test_the_p_mean_goes_from_the_mean_to_the_largest() -> None:
     steps = np.eye(3)
     found = central(lambda h: [float(combined(LOSSES + h * e, WEIGHTS, 8.0)) for e in steps], 1e-6)
     np.testing.assert_allclose(slope, found, rtol=1e-6, atol=1e-9)
-    assert float(combined(0.0 * LOSSES, WEIGHTS, 8.0)) == 0.0
+    value, slope = jax.value_and_grad(lambda x: combined(x, WEIGHTS, 8.0))(0.0 * LOSSES)
+    assert float(value) == 0.0
+    np.testing.assert_array_equal(slope, 0.0)
 
 
 def robust(angles: Floats = ANGLES) -> Scene:
