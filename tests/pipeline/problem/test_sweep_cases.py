@@ -80,7 +80,7 @@ def test_a_key_that_leads_nowhere_is_refused(
 
 @pytest.mark.parametrize("limited", [False, True])
 def test_a_foil_may_be_swept(limited: bool, tmp_path: Path) -> None:
-    """What is cut is of the foil that the setting gives, in each case."""
+    """Shims are cut of the foil that each setting gives."""
     foil = "foil: { young_modulus: 4500 MPa, thickness: 0.125 mm, width: 8 mm }"
     path = study(tmp_path, RAMP)
     text = path.read_text(encoding="utf-8")
