@@ -18,6 +18,7 @@ from sim.energy import (
     System,
     Workspace,
     admissible_step,
+    gradient,
     hessian_product,
     locate,
     mixed,
@@ -40,10 +41,16 @@ CROOKED, CROOKED_LENGTH = 0.05, 1e-3
 """Departure of a smooth increment from the trapezoidal rule at most, over its length and in mm."""
 SHORTER, LONGER = 0.25, 4.0
 """Limits of the next increment over the last."""
+STEPS_AHEAD = 6
+"""Newton steps at most by which an increment goes on where the barrier cuts its first step."""
 SHORT = 0.2
 """Correction of a known step at most, over its length."""
-TOWARDS_CRITICAL = 0.75
-"""Part of the way to where the eigenvalue is expected to vanish that an increment goes at most."""
+STIFF_PART, SOFT_PART, NEAR_PART = 0.75, 0.5, 0.98
+"""Part of the way to where the eigenvalue is expected to vanish that an increment goes at most: of
+a stiff structure, of a soft one, as more of the path to a limit point is too crooked, and near."""
+SOFT, NEAR = 0.5, 2e-7
+"""Eigenvalue over the first state's up to which a structure is soft, and part of the way between
+two loads that is near."""
 CRITICAL = 1e-3
 """Eigenvalue at the end of a path below which it is singular there, over the first state's."""
 UNLOADED = 1e-7
@@ -202,29 +209,63 @@ def _ahead(increment: float, left: float, way: float, pace: Floats) -> float:
     if pace[RATE] >= 0.0:
         return min(increment, left)
     # lambda^2 falls linearly towards a limit point, and faster than that towards a branching
-    expected = TOWARDS_CRITICAL * pace[VALUE] ** 2 / -pace[RATE]
-    return min(increment, left, max(expected / way, CLOSE))
+    expected = pace[VALUE] ** 2 / (-pace[RATE] * way)
+    part = SOFT_PART if pace[VALUE] < SOFT * pace[FIRST] else STIFF_PART
+    if expected < NEAR:
+        part = NEAR_PART
+    return min(increment, left, max(part * expected, SMALLEST_INCREMENT))
+
+
+@compiled
+def _newton_ahead(motion: Floats, system: System, work: Workspace) -> None:
+    """Fills ``work.step`` with Newton's for the held dofs' part in ``work.product``.
+
+    The workspace holds a factor of the tangent.
+    """
+    # K_ff du_f = -(r_f + K_fh du_h)
+    gradient(motion, system, work.kinematics, work.force)
+    work.trial[:] = work.force
+    hessian_product(motion, system, work.kinematics, work.product, work.force)
+    for d in system.dofs:
+        work.force[d] += work.trial[d]
+    solve_free(system, work)
+    for d in system.held:
+        work.step[d] = work.product[d]
 
 
 @compiled
 def _step_ahead(
-    motion: Floats, load: Floats, share: float, predicted: Floats, system: System, work: Workspace
-) -> float:
-    """Moves along the path's tangent by a share of the way to a load, short of the barrier.
+    motion: Floats, load: Floats, share: float, predicted: Floats, system: System, work: Workspace,
+    counts: Ints,
+) -> float:  # fmt: skip
+    """Moves by a share of the way to a load, in steps that stop short of the barrier.
+
+    The first goes along the path's tangent. Where the barrier cuts it short, Newton's follow, free
+    and held dofs together, so that contacts need not come to rest again and again on the way.
 
     Returns:
-        the part of that share gone; ``predicted`` is filled with the step.
+        the part of that share gone; ``predicted`` is filled with the path's tangent for it.
     """
     work.saved[:] = motion
     _towards(motion, load, share, system, work)
     _tangent_step(motion, system, work)
-    allowed = min(1.0, KEEP_FROM_BARRIER * admissible_step(motion, system, work.step))
-    predicted[:] = allowed * work.step
-    motion += predicted
-    if allowed == 1.0 and share == 1.0:
+    predicted[:] = work.step
+    gone = min(1.0, KEEP_FROM_BARRIER * admissible_step(motion, system, work.step))
+    motion += gone * work.step
+    for _ in range(STEPS_AHEAD):
+        if gone == 1.0 or not factorise_tangent(motion, system, work, 0.0, counts):
+            break
+        left = share * (1.0 - gone) / (1.0 - share * gone)
+        _towards(motion, load, left, system, work)
+        _newton_ahead(motion, system, work)
+        allowed = min(1.0, KEEP_FROM_BARRIER * admissible_step(motion, system, work.step))
+        motion += allowed * work.step
+        gone = 1.0 if allowed == 1.0 else gone + allowed * (1.0 - gone)
+    predicted *= gone
+    if gone == 1.0 and share == 1.0:
         for i in range(len(system.held)):
             motion[system.held[i]] = load[i]
-    return allowed
+    return gone
 
 
 @inlined
@@ -259,8 +300,8 @@ def _advance(
         counts[INCREMENTS] += 1
         ahead = _ahead(pace[INCREMENT], 1.0 - done, way, pace)
         share = ahead / (1.0 - done)
-        gone = ahead * _step_ahead(motion, load, share, predicted, system, work)
-        if not gone >= SMALLEST_INCREMENT:  # held units drive a void into its barrier
+        gone = ahead * _step_ahead(motion, load, share, predicted, system, work, counts)
+        if not gone >= min(SMALLEST_INCREMENT, ahead):  # held units drive a void into its barrier
             motion[:] = work.saved
             break
         last = share == 1.0 and gone == ahead

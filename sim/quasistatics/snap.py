@@ -7,6 +7,7 @@ point alone, not on the loads by which the path came to it.
 
 import numpy as np
 
+from sim.collision import units_met
 from sim.core import Floats, Ints, compiled
 from sim.energy import System, Workspace, admissible_step, gradient, tangent
 from sim.linalg import add, clear, factorise, solve
@@ -27,8 +28,15 @@ AT_REST = 0.02
 """Newton step below which the damped motion ends in the minimum that the step leads to, mm."""
 CLOSER = 0.5
 """Factor of that limit after a step that led to no minimum."""
-FIRST_STEP = 1e-3
+SLOWER, PATIENCE = 0.5, 10
+"""Speed at which rest is looked for, over the fastest since it was last, and the number of steps
+after which it is anyway."""
+FIRST_STEP = 1.0
 """First step of the damped motion, times the drag over the median axial stiffness."""
+LONGER, LONGER_AGAIN, TOO_LONG = 5.0, 1.5, 0.5
+"""Limit of the next step over the last, the factor by which that comes back after 1 at a rejection,
+and the factor on a rejected step at most: while the structure leaves a critical point, the longest
+step for which the system is positive definite shrinks."""
 MAX_STEPS = 5000
 PUSH = 1e-2
 """Largest movement by which a critical point is left along its mode, mm."""
@@ -85,23 +93,34 @@ def relax(
     workspace is overwritten but for ``saved``, and holds a factor of the tangent at rest after it.
     """
     h = FIRST_STEP * drag[system.dofs].min() / float(np.median(system.net.law[:, 0]))
-    near = AT_REST
+    near, fastest, steps, growth = AT_REST, 0.0, 0, LONGER
     gradient(motion, system, work.kinematics, work.force)
     for _ in range(MAX_STEPS):
+        if units_met(system.contacts):  # no step is short enough
+            return False
         if not _ros2(motion, drag, h, system, work, counts):
-            h *= 0.25
+            h *= TOO_LONG
+            growth = 1.0
             continue
         # work.product: the step of second order; work.guess: its difference from one of first
         error, moved = _largest(work.guess, system), _largest(work.product, system)
         allowed = KEEP_FROM_BARRIER * admissible_step(motion, system, work.product)
         longer = 0.8 * np.sqrt(FLOW_ERROR / max(error, 1e-300))
         if error > FLOW_ERROR or allowed < 1.0:
-            h *= min(0.5, max(0.2, longer))
+            h *= min(TOO_LONG, max(0.2, longer))
+            growth = 1.0
             continue
-        h *= min(5.0, longer)
+        speed = moved / h
+        h *= min(growth, longer)
+        growth = min(LONGER, LONGER_AGAIN * growth)
         motion += work.product
         gradient(motion, system, work.kinematics, work.force)
-        if moved < AT_REST and factorise_tangent(motion, system, work, 0.0, counts):
+        steps += 1
+        fastest = max(fastest, speed)
+        if moved >= AT_REST or (speed > SLOWER * fastest and steps < PATIENCE):
+            continue
+        fastest, steps = speed, 0
+        if factorise_tangent(motion, system, work, 0.0, counts):
             solve_free(system, work)
             if _largest(work.step, system) < near:
                 # just beyond a limit point the motion is as slow as at rest, and no minimum is near

@@ -71,6 +71,16 @@ def test_every_snap_between_two_loads_is_recorded() -> None:
     np.testing.assert_allclose(few.snaps, many.snaps, rtol=0, atol=1e-7)
 
 
+@pytest.mark.parametrize("short", np.arange(1, 20) * 1e-9)
+def test_a_load_just_before_a_snap_is_reached(short: float) -> None:
+    """However little of the way increments leave."""
+    rig, values = crumpled(31)
+    first = StaticSolver(rig.topology, np.ones(1)).forward(values, rig.drive)[2].snaps[0]
+    times = np.array([first - short, 1.0])
+    record = StaticSolver(rig.topology, times).forward(values, rig.drive)[2]
+    np.testing.assert_array_equal(record.stable, 1)
+
+
 @pytest.mark.parametrize("size", [6, 30])
 def test_modes_are_those_nearest_to_zero_from_below(size: int) -> None:
     """However large the structure is."""

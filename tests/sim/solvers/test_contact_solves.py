@@ -7,11 +7,13 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from sim.collision import CandidatePairs
+from sim.collision import CandidatePairs, new_pairs
 from sim.core import Floats, NewContactPairs, SimulationError
-from sim.energy import observe
+from sim.energy import observe, system_of, workspace
 from sim.quasistatics import StaticSolver, eigenvalue_and_slopes, static_solver
 from sim.quasistatics.equilibrium_path import follow
+from sim.quasistatics.newton import FACTORS
+from sim.quasistatics.snap import relax
 from sim.solvers import LinearRamp, Records, Solver, adjoint_cases, solve_case, solve_cases
 from sim.structure import clearance, close_pairs, displaced
 from sim.time_integration import ExplicitSolver, ImplicitSolver
@@ -113,6 +115,17 @@ def test_units_meet_that_were_far_apart_at_rest() -> None:
     states = path(rig, StaticSolver(rig.topology, np.linspace(0.25, 1.0, 4)))
     assert_clear_in_contact(rig, states)
     assert states[-1, 1, 0] < -0.4
+
+
+def test_damped_motion_ends_where_units_meet() -> None:
+    rig = far_apart(32.0)
+    system, counts = system_of(rig.topology, rig.values), np.zeros(4, dtype=np.int64)
+    motion = np.zeros(rig.topology.n_dofs)
+    motion[3], motion[6] = -1.0, -32.0
+    drag = np.ones_like(motion)
+    assert not relax(motion, drag, 1e-10, 1e-10, system, workspace(system), counts)
+    assert new_pairs(system.contacts).tolist() == [[1, 2]]
+    assert counts[FACTORS] < 100
 
 
 def test_a_path_goes_on_from_the_load_before_units_met(monkeypatch: pytest.MonkeyPatch) -> None:
