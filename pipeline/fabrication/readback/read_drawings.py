@@ -1,8 +1,8 @@
 """Reads a written drawing, DXF or SVG, as plain curves in millimetres, y up.
 
-Nothing here knows how the files are made: DXF goes through ezdxf's recovering reader and its
-auditor, SVG through svgelements. In a DXF extended data under the name METACLOAK tell the part of
-a curve, in an SVG the label of an outer cut does. All else belongs to the outline around it.
+Nothing here knows how the files are made: DXF goes through ezdxf's reader and its auditor, SVG
+through svgelements. In a DXF extended data under the name METACLOAK tell the part of a curve, in an
+SVG the label of an outer cut does. All else belongs to the outline around it.
 """
 
 from __future__ import annotations
@@ -154,16 +154,14 @@ def _near(one: Curve, other: Curve) -> bool:
 
 def _read_dxf(path: Path) -> Drawing:
     """Reads a DXF file to which ezdxf's auditor does not object."""
-    from ezdxf import recover
+    from ezdxf.filemanagement import readfile
     from ezdxf.lldxf.const import DXFError
 
     try:
-        complete = path.read_bytes().split()[-1:] == [b"EOF"]
-        document, auditor = recover.readfile(path)
+        document = readfile(path)
     except (OSError, DXFError) as error:
         raise unreadable("a drawing", path, error) from error
-    if not complete:  # which the recovering reader does not mind
-        raise unreadable("a drawing", path, "its end is missing")
+    auditor = document.audit()
     if troubles := [*auditor.errors, *auditor.fixes]:
         raise unreadable("a drawing", path, troubles[0].message)
     curves = tuple(_dxf_curve(entity) for entity in document.modelspace())

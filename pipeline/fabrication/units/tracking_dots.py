@@ -1,9 +1,8 @@
 """Places the tracking dots of a unit, and the holes for the pins that align its layers."""
 
-from itertools import combinations
-
 import numpy as np
 import shapely
+from scipy.spatial import distance
 from shapely import Polygon
 
 from pipeline.fabrication.parts import Circle, Strokes
@@ -76,6 +75,7 @@ def pin_holes(outline: Polygon, written: Strokes, settings: Fabrication) -> tupl
     if room.is_empty:
         return ()
     spots = np.unique(np.round(shapely.get_coordinates(room) / _GRID) * _GRID, axis=0)
-    far = max(combinations(spots, 2), key=lambda pair: float(np.linalg.norm(pair[1] - pair[0])))
-    kept = far if np.linalg.norm(far[1] - far[0]) >= pin + wall else far[:1]
+    apart = distance.cdist(spots, spots)
+    far = spots[list(np.unravel_index(apart.argmax(), apart.shape))]
+    kept = far if apart.max() >= pin + wall else far[:1]
     return tuple(Circle((float(x), float(y)), pin) for x, y in kept)
