@@ -33,5 +33,5 @@ def join_parts(paths: Sequence[Path], kind: Kind, dim: str, out: Path) -> None:
             raise UserError(
                 "the part belongs to another design", file=path, remedy="remove it and run again"
             )
-    whole = xr.concat(parts, dim=dim, combine_attrs="drop").sortby(dim)
+    whole = xr.concat(parts, dim=dim, combine_attrs="drop_conflicts").sortby(dim)
     datasets.write(whole, out, kind, dict(parts[0].attrs))

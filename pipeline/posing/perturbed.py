@@ -169,7 +169,10 @@ def _along(motion: MotionLaw) -> Floats:
 def _row(
     scene: Scene, copy: PerturbedStructure, outcomes: list[Outcome[PerturbedResponse]]
 ) -> xr.Dataset:
-    """Reduces one copy to the mean of its load cases, or to why there is none."""
+    """Reduces one copy to the mean of its load cases, or to why there is none.
+
+    How far it is from its target stays that of each: they differ in size.
+    """
     failure = next((outcome.failure for outcome in outcomes if outcome.failure is not None), None)
     if not copy.sound:
         failure = f"units still overlap at rest after {MOST_ROUNDS} draws"
@@ -180,10 +183,11 @@ def _row(
         values = np.array([getattr(course, name) for course in courses])
         return np.tensordot(scene.loads.case_weights, values, axes=1)
 
+    unknown = np.full((len(scene.loads.cases), len(times)), np.nan)
     curves = {
-        name: ("time", np.full(len(times), np.nan) if failure else mean(name))
-        for name in ("rotation", "departure", "reaction")
+        name: ("time", unknown[0] if failure else mean(name)) for name in ("rotation", "reaction")
     }
+    departure = unknown if failure else np.array([course.departure for course in courses])
     voids = [course.min_void_angle for course in courses]
     numbers = {
         "loss": np.nan if failure else float(mean("loss")),
@@ -192,6 +196,7 @@ def _row(
         "redrawn": copy.redrawn,
         "status": failure or "ok",
     }
+    single = {name: ((), value) for name, value in numbers.items()}
     return xr.Dataset(
-        {**curves, **{name: ((), value) for name, value in numbers.items()}}, {"time": times}
+        {**curves, "departure": (("case", "time"), departure), **single}, {"time": times}
     )

@@ -177,11 +177,11 @@ def scatter(chosen: Problem) -> xr.Dataset:
     status = np.full(size, "ok", dtype=object)
     status[1, 2] = "no equilibrium found beyond load 3 of 4"
     rotation = np.where((status == "ok")[..., None], reach[..., None] * time, np.nan)
-    copy = ("noise", "sample")
+    copy, cases = ("noise", "sample"), len(chosen.drive.case_weights)
     return xr.Dataset(
         {
             "rotation": ((*copy, "time"), rotation),
-            "departure": ((*copy, "time"), rotation),
+            "departure": ((*copy, "case", "time"), np.stack([rotation] * cases, axis=2)),
             "reaction": ((*copy, "time"), 12.0 + rotation),
             "loss": (copy, rotation[..., -1]),
             "min_void_angle": (copy, rotation[..., -1]),

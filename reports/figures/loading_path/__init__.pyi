@@ -6,7 +6,6 @@ from .abscissa import abscissa_of as abscissa_of
 from .abscissa import structures as structures
 from .contact_comparison import overlapping as overlapping
 from .curves import measure_panel as measure_panel
-from .curves import over_cases as over_cases
 from .curves import path_axes as path_axes
 from .curves import structure_curves as structure_curves
 from .facts import loss_facts as loss_facts
@@ -18,6 +17,7 @@ from .figure import design_panels as design_panels
 from .figure import fields as fields
 from .figure import marks as marks
 from .measures import interest as interest
+from .measures import over_cases as over_cases
 from .measures import scales as scales
 from .measures import squares as squares
 from .snapshot_grid import SnapshotLayout as SnapshotLayout

@@ -9,7 +9,7 @@ from pipeline.problem import Problem
 from reports.facts import Fact, facts_of, percent, stability_facts, worded
 from reports.figures.loading_path import measures
 from reports.figures.loading_path.abscissa import structures
-from reports.figures.loading_path.curves import over_cases
+from reports.figures.loading_path.measures import over_cases
 from reports.study import RedesignResults, StudyResults, display_name
 
 _told = facts_of(__file__)

@@ -19,7 +19,7 @@ from reports.figures.loading_path.abscissa import (
     structures,
 )
 from reports.figures.loading_path.drive_response import drive_response
-from reports.figures.loading_path.measures import Measure
+from reports.figures.loading_path.measures import Measure, over_cases
 from reports.panels import measured_overlay
 from reports.study import RedesignResults, StudyResults, display_name
 
@@ -77,12 +77,6 @@ def structure_curves(
             axes.plot(
                 path.values, curve, color=colour, lw=width, ls=dashes, label=label, zorder=order
             )
-
-
-def over_cases(problem: Problem, values: xr.DataArray) -> xr.DataArray:
-    """Returns weighted mean over the load cases."""
-    weights = xr.DataArray(np.array(problem.drive.case_weights), dims="case")
-    return (values * weights).sum("case", skipna=False) / float(weights.sum())
 
 
 def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Measure) -> None:

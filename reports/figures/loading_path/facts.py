@@ -31,8 +31,8 @@ from reports.figures.loading_path.abscissa import (
     load_names,
     structures,
 )
-from reports.figures.loading_path.curves import over_cases
 from reports.figures.loading_path.drive_response import drive_response
+from reports.figures.loading_path.measures import over_cases
 from reports.study import StudyResults, display_name, from_dataset
 from sim.core import Floats
 

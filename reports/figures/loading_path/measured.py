@@ -1,6 +1,6 @@
 """Describes recordings along the path: in the form of responses, as curves, and as numbers."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 
 import numpy as np
 import xarray as xr
@@ -10,18 +10,21 @@ from pipeline.comparison import compute_reduction
 from reports.base import style
 from reports.facts import MEASURED, Fact, facts_of, intervals
 from reports.figures.loading_path import measures
-from reports.figures.loading_path.abscissa import Abscissa
+from reports.figures.loading_path.abscissa import Abscissa, load_names
 from reports.figures.loading_path.measures import Measure
 from reports.panels import measured_overlay
 from reports.study import RecordedMotion, StudyResults, display_name
 from sim.core import Floats
 
 Of = Callable[[xr.Dataset], xr.DataArray]
+Under = tuple[str, str]
+"""Ends of a fact's key and of its label that tell the load case."""
 
 _NAMES = {"rotation": "mean_rotation", "mismatch": "mimicking_error", "contraction": "contraction"}
 """What comparisons follow, by the key of the report's measure."""
 _ENDS = ("low", "high")
 _SIDES = ("measured", "simulated")
+_CASE = ("case", "under")
 _told = facts_of(__file__)
 
 
@@ -90,65 +93,92 @@ def forces(axes: Axes, study: StudyResults) -> None:
 
 
 def measured_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
-    """Yields the measure and the contraction at the end of the path, as they were measured."""
+    """Yields the measure and the contraction of the path, as they were measured, by load case."""
     measure = measures.measure_of(study.problem)
-    yield from _measure_facts(study, path, measure)
-    if not path.static:
-        return
+    cases = sorted({each.case for each in study.recordings})
+    names = load_names(study.problem, study.response)
+    for case in cases:
+        recorded = [each for each in study.recordings if each.case == case]
+        under = ("", "") if len(cases) == 1 else (f"_case{case}", f", {names[case]}")
+        yield from _measure_facts(study, recorded, path, measure, under)
+        if path.static:
+            yield from _contraction_facts(study, recorded, path, under)
+
+
+def _contraction_facts(
+    study: StudyResults, recorded: Sequence[RecordedMotion], path: Abscissa, under: Under
+) -> Iterator[Fact]:
     ends: dict[str, float] = {}
-    for each in study.recordings:
+    for each in recorded:
         values = curve(study, path, each, lambda made: measures.contraction(study.problem, made))
         ends[each.structure] = values[-1]
         note = f"{each.source}; {_interval(each, path, 'contraction')}"
-        yield _of(study, "contraction_{structure}", each.structure, values[-1], note=note)
+        yield _of(study, "contraction_{structure}", each.structure, values[-1], under, note=note)
     for name in ("altered", "cloaked"):
         if name in ends and "intact" in ends:
             off = ends[name] / ends["intact"] - 1.0
-            note = _change(study, path, "contraction", ("intact", name), sign=-1)
-            yield _of(study, "contraction_error_{structure}", name, off, note=note)
+            note = _change(recorded, path, "contraction", ("intact", name), sign=-1)
+            yield _of(study, "contraction_error_{structure}", name, off, under, note=note)
 
 
-def _of(study: StudyResults, key: str, structure: str, value: float, /, **words: object) -> Fact:
+def _of(
+    study: StudyResults, key: str, structure: str, value: float, under: Under, /, **words: object
+) -> Fact:
     shown = display_name(study.problem, structure).lower()
-    key = f"{{measured}}{key}"
-    return _told(key, value, measured=MEASURED, structure=structure, shown=shown, **words)
+    words |= {"measured": MEASURED, "structure": structure, "shown": shown}
+    return _told(
+        f"{{measured}}{key}{{case}}", value, **words, **dict(zip(_CASE, under, strict=True))
+    )
 
 
-def _measure_facts(study: StudyResults, path: Abscissa, measure: Measure) -> Iterator[Fact]:
+def _measure_facts(
+    study: StudyResults,
+    recorded: Sequence[RecordedMotion],
+    path: Abscissa,
+    measure: Measure,
+    under: Under,
+) -> Iterator[Fact]:
+    """Yields the measure at the end of a path, its root mean square of a motion in time."""
     ends: dict[str, float] = {}
     of = {"key": measure.key, "what": measure.label, "unit": measure.unit}
-    for each in study.recordings:
+    for each in recorded:
         if each.structure == "intact":
             continue
         values = curve(study, path, each, measure.of)
-        ends[each.structure] = values[-1]
+        course = xr.DataArray(values, dims="time")
+        ends[each.structure] = end = float(measures.overall(study.problem, course))
         note = f"{each.source}; {_interval(each, path, measure.key)}".removesuffix("; ")
-        yield _of(study, "{key}_{structure}", each.structure, values[-1], note=note, **of)
+        yield _of(study, "{key}_{structure}", each.structure, end, under, note=note, **of)
         most = float(np.nanmax(values))
-        yield _of(study, "{key}_{structure}_most", each.structure, most, **of)
+        yield _of(study, "{key}_{structure}_most", each.structure, most, under, **of)
     if {"altered", "cloaked"} <= ends.keys():
         gain = 1.0 - ends["cloaked"] / ends["altered"]
-        note = _change(study, path, measure.key, ("altered", "cloaked"))
+        note = _change(recorded, path, measure.key, ("altered", "cloaked"))
         words = {"measured": MEASURED, "key": measure.key, "what": measure.label}
-        yield _told("{measured}{key}_reduction", gain, note=note, **words)
+        words |= dict(zip(_CASE, under, strict=True))
+        yield _told("{measured}{key}_reduction{case}", gain, note=note, **words)
 
 
 def _interval(recording: RecordedMotion, path: Abscissa, key: str) -> str:
     """Finds the interval of a quantity at the end of the path, and what was predicted, in words."""
-    if key not in _NAMES:
+    if key not in _NAMES or not path.static:
         return ""
     measured, predicted = (_at_the_end(recording, path, key, side) for side in _SIDES)
     return intervals(measured[1:], predicted[1:])
 
 
 def _change(
-    study: StudyResults, path: Abscissa, key: str, between: tuple[str, str], sign: int = 1
+    recorded: Sequence[RecordedMotion],
+    path: Abscissa,
+    key: str,
+    between: tuple[str, str],
+    sign: int = 1,
 ) -> str:
     """Returns the same of what the second of two structures takes from a quantity of the first."""
-    if key not in _NAMES:
+    if key not in _NAMES or not path.static:
         return ""
     ends = []
     for side in _SIDES:
-        of = {each.structure: _at_the_end(each, path, key, side) for each in study.recordings}
+        of = {each.structure: _at_the_end(each, path, key, side) for each in recorded}
         ends.append(np.sort(100 * sign * compute_reduction(*(of[name] for name in between))[1:]))
     return intervals(ends[0], ends[1], " %")

@@ -64,20 +64,24 @@ def motion(response: xr.Dataset, scale: tuple[float, float, float]) -> xr.DataAr
 def mismatch(
     response: xr.Dataset, scale: tuple[float, float, float], static: bool = True
 ) -> xr.DataArray:
-    """Returns norm of U - U_intact over the region of interest, over what ``size_of_intact`` is."""
+    """Returns RMS of U - U_intact over the region of interest, over what ``size_of_intact`` is.
+
+    Units that a recording lost count in neither.
+    """
     inside = interest(response)
     intact = inside.sel(structure="intact")
-    apart: xr.DataArray = squares(inside - intact, scale).sum("unit") ** 0.5
-    return apart / size_of_intact(response, scale, static)
+    apart: xr.DataArray = squares(inside - intact, scale).mean("unit")
+    return apart**0.5 / size_of_intact(response, scale, static)
 
 
 def size_of_intact(
     response: xr.Dataset, scale: tuple[float, float, float], static: bool = True
 ) -> xr.DataArray:
-    """Finds the norm (case,) of U_intact over the region of interest: at the end, most in time."""
+    """Finds the RMS (case,) of |U_intact| over the region of interest: at the end, most in time."""
     intact = interest(response).sel(structure="intact")
-    size: xr.DataArray = squares(intact, scale).sum("unit") ** 0.5
-    return size.isel(time=-1) if static else size.max("time")
+    mean: xr.DataArray = squares(intact, scale).mean("unit")
+    size = mean**0.5
+    return size.isel(time=-1, drop=True) if static else size.max("time")
 
 
 def overall(problem: Problem, values: xr.DataArray) -> xr.DataArray:
@@ -91,6 +95,12 @@ def overall(problem: Problem, values: xr.DataArray) -> xr.DataArray:
     return mean**0.5
 
 
+def over_cases(problem: Problem, values: xr.DataArray) -> xr.DataArray:
+    """Returns weighted mean over the load cases."""
+    weights = xr.DataArray(np.array(problem.drive.case_weights), dims="case")
+    return (values * weights).sum("case", skipna=False) / float(weights.sum())
+
+
 def scales(problem: Problem) -> tuple[float, float, float]:
     """Returns divisors that make (ux, uy, theta) dimensionless: U = (ux/s, uy/s, theta)."""
     return problem.lattice.spacing, problem.lattice.spacing, 1.0
@@ -102,9 +112,9 @@ def interest(response: xr.Dataset) -> xr.DataArray:
 
 
 def squares(displacement: xr.DataArray, scale: tuple[float, float, float]) -> xr.DataArray:
-    """Returns sum of squares of dimensionless displacements (..., dof)."""
+    """Returns sum of squares of dimensionless displacements (..., dof); NaN if one is unknown."""
     divisors = xr.DataArray(np.array(scale), dims="dof", coords={"dof": displacement["dof"]})
-    return ((displacement / divisors) ** 2).sum("dof")
+    return ((displacement / divisors) ** 2).sum("dof", skipna=False)
 
 
 def contraction(problem: Problem, response: xr.Dataset) -> xr.DataArray:

@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem import Problem
-from reports.figures.loading_path.measures import Measure, scales, size_of_intact
+from reports.figures.loading_path.measures import Measure, over_cases, scales, size_of_intact
 
 
 def copy_curves(
@@ -13,8 +13,7 @@ def copy_curves(
     """Returns the measure (noise, sample, time) of every copy, NaN where it failed."""
     if measure.key == "rotation":
         return np.degrees(copies["rotation"])  # type: ignore[return-value]
-    if measure.key == "motion":
-        return copies["departure"]
-    count = int(response["roi"].sum())
-    intact = float(size_of_intact(response, scales(problem), problem.static).isel(case=0))
-    return copies["departure"] * np.sqrt(count) / intact
+    departure = copies["departure"]
+    if measure.key == "mismatch":
+        departure = departure / size_of_intact(response, scales(problem), problem.static)
+    return over_cases(problem, departure)

@@ -9,8 +9,8 @@ from reports.base import Table
 from reports.facts import Columns, history, vertices
 from reports.figures.loading_path import measures, monte_carlo
 from reports.figures.loading_path.abscissa import abscissa_of, load_names, structures
-from reports.figures.loading_path.curves import over_cases
 from reports.figures.loading_path.drive_response import drive_response
+from reports.figures.loading_path.measures import over_cases
 from reports.study import StudyResults
 
 

@@ -12,8 +12,18 @@ from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.sections.drives import RotationDrive
 from reports.facts import Fact
 from reports.facts.measures import first_within
-from reports.figures.loading_path import abscissa, curves, facts, measures, snapshot_grid, tables
+from reports.figures.loading_path import (
+    abscissa,
+    curves,
+    facts,
+    measured,
+    measures,
+    monte_carlo,
+    snapshot_grid,
+    tables,
+)
 from reports.study import StudyResults, evaluation_count
+from tests.reports import recorded_study
 from tests.reports.compressed_study import SHIELD, written
 from tests.tables import cases
 
@@ -41,6 +51,7 @@ def _with_second_case(response: xr.Dataset) -> xr.Dataset:
         if "case" in response[name].dims
     ]
     second = xr.merge(more, compat="override").assign_coords(direction=("case", [90.0]))
+    second["drive_displacement"] = -second["drive_displacement"].roll(xy=1)
     whole = xr.concat([response, second], "case", data_vars="minimal", coords="minimal")
     return whole.assign_attrs(response.attrs)
 
@@ -119,3 +130,28 @@ def test_failed_evaluations_count(two: StudyResults) -> None:
     history["violation"] = ("evaluation", [0.0] * 6 + [np.nan])
     assert evaluation_count(history) == 6
     assert first_within(history["loss"].values, 0.1, 0.9) == 5
+
+
+def test_recordings_are_compared_under_their_own_load_case(
+    two: StudyResults, tmp_path: Path
+) -> None:
+    shown = (("altered", 0), ("altered", 1), ("cloaked", 1))
+    filmed = recorded_study.with_recordings(two, tmp_path, *shown)
+    path = abscissa.abscissa_of(two.problem, two.response)
+    found = {fact.key: fact.value for fact in measured.measured_facts(filmed, path)}
+    first, second = (found[f"measured_rotation_altered_case{case}"] for case in (0, 1))
+    assert second == pytest.approx(3 * first)
+    gain = found["measured_rotation_reduction_case1"]
+    assert gain == pytest.approx(100 * (1 - found["measured_rotation_cloaked_case1"] / second))
+    assert "measured_rotation_reduction_case0" not in found
+
+
+def test_copies_are_measured_in_the_size_of_each_load_case(two: StudyResults) -> None:
+    mimic = measures.Measure("mismatch", "", "", "1", lambda made: made["loss"])
+    named = [*two.response["structure"].values[:-1], "intact"]
+    response = two.response.assign_coords(structure=named)
+    sizes = measures.size_of_intact(response, measures.scales(two.problem))
+    assert sizes[1] == pytest.approx(3 * float(sizes[0]))
+    copies = xr.Dataset({"departure": (("case", "time"), [[0.1], [0.3]])})
+    found = monte_carlo.copy_curves(two.problem, mimic, response, copies)
+    np.testing.assert_allclose(found, 0.1 / sizes[0])

@@ -1,5 +1,6 @@
 import dataclasses
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
@@ -17,7 +18,7 @@ from reports.base import style
 from reports.facts import checks, fact_records, foil
 from reports.facts.copies import spreads
 from reports.figures import kinds
-from reports.figures.loading_path import abscissa, figure, measures, monte_carlo
+from reports.figures.loading_path import abscissa, figure, measured, measures, monte_carlo
 from reports.figures.loading_path import facts as path_facts
 from reports.figures.loading_path.drive_response import drive_response
 from reports.figures.loading_path.structure_panels import rest_panel
@@ -27,7 +28,7 @@ from reports.figures.study_report import as_built_facts, study_report
 from reports.page import publish
 from reports.panels import payload
 from reports.study import StudyResults
-from tests.reports import compressed_study, figure_assertions
+from tests.reports import compressed_study, figure_assertions, recorded_study
 from tests.tables import refused, some
 
 S = 15.0
@@ -114,6 +115,31 @@ def test_copies_are_measured_like_the_structure(shield: StudyResults, smile: Stu
         assert copies is not None
         found = monte_carlo.copy_curves(study.problem, measure, study.response, copies)
         np.testing.assert_allclose(found, factor * copies["rotation"], rtol=1e-12)
+
+
+@pytest.mark.parametrize("of", [measures.motion, measures.mismatch])
+def test_units_that_were_lost_do_not_count(
+    smile: StudyResults, of: Callable[..., xr.DataArray]
+) -> None:
+    """Where all units miss the target by as much, it is the same whichever are seen."""
+    apart = smile.response.copy(deep=True)
+    apart["displacement"][:] = 1.0
+    apart["displacement"].loc[{"structure": "cloaked"}] = 3.0
+    lost = apart.copy(deep=True)
+    lost["displacement"].loc[{"structure": "cloaked", "unit": apart["unit"][::2]}] = np.nan
+    seen, some = (of(made, (S, S, 1.0)).sel(structure="cloaked") for made in (apart, lost))
+    np.testing.assert_allclose(some, seen)
+
+
+def test_a_measured_motion_in_time_is_its_mean(study: StudyResults, tmp_path: Path) -> None:
+    filmed = recorded_study.with_recordings(study, tmp_path, ("cloaked", 0))
+    path = abscissa.abscissa_of(study.problem, study.response)
+    found = {fact.key: fact.value for fact in measured.measured_facts(filmed, path)}
+    key = measures.measure_of(study.problem).key
+    [recording] = filmed.recordings
+    course = measured.curve(filmed, path, recording, measures.measure_of(study.problem).of)
+    rms = np.sqrt(np.nanmean(course**2))
+    assert found[f"measured_{key}_cloaked"] == pytest.approx(float(rms))
 
 
 def test_contacts_are_those_at_the_end_of_the_path(smile: StudyResults) -> None:
