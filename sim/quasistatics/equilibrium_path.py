@@ -37,7 +37,7 @@ SMALLEST_INCREMENT = 1e-8
 """Part of the way between two loads below which the path has ended."""
 CLOSE = 1e-6
 """Part of the way that the end of a path is passed by."""
-CROOKED, CROOKED_LENGTH = 0.05, 1e-3
+CROOKED, CROOKED_LENGTH = 0.05, 1e-5
 """Departure of a smooth increment from the trapezoidal rule at most, over its length and in mm."""
 SHORTER, LONGER = 0.25, 4.0
 """Limits of the next increment over the last."""
@@ -45,12 +45,12 @@ STEPS_AHEAD = 6
 """Newton steps at most by which an increment goes on where the barrier cuts its first step."""
 SHORT = 0.2
 """Correction of a known step at most, over its length."""
-STIFF_PART, SOFT_PART, NEAR_PART = 0.75, 0.5, 0.98
+STIFF_PART, SOFT_PART = 0.75, 0.5
 """Part of the way to where the eigenvalue is expected to vanish that an increment goes at most: of
-a stiff structure, of a soft one, as more of the path to a limit point is too crooked, and near."""
-SOFT, NEAR = 0.5, 2e-7
-"""Eigenvalue over the first state's up to which a structure is soft, and part of the way between
-two loads that is near."""
+a stiff structure, and of a soft one, as more of the path to a limit point is too crooked."""
+SOFT, SINGULAR = 0.5, 1e-6
+"""Eigenvalue over the first state's up to which a structure is soft, and up to which a path has
+ended: beyond, the residual's tolerance does not fix the critical mode."""
 CRITICAL = 1e-3
 """Eigenvalue at the end of a path below which it is singular there, over the first state's."""
 UNLOADED = 1e-7
@@ -65,6 +65,8 @@ SWEEPS, SWEEPS_AT_LOADS = 2, 40
 """Inverse iterations for the eigenvalue of an increment and of an output load at most."""
 EIGENVALUE = 1e-6
 """Relative change that ends them."""
+SCATTER = 0.5
+"""Length of numbers without symmetry that are added to the last mode at an output load."""
 
 INCREMENT, VALUE, RATE, FIRST = 0, 1, 2, 3
 """Places in the pace: part of the way to go next, smallest eigenvalue, rate of change of its square
@@ -211,8 +213,6 @@ def _ahead(increment: float, left: float, way: float, pace: Floats) -> float:
     # lambda^2 falls linearly towards a limit point, and faster than that towards a branching
     expected = pace[VALUE] ** 2 / (-pace[RATE] * way)
     part = SOFT_PART if pace[VALUE] < SOFT * pace[FIRST] else STIFF_PART
-    if expected < NEAR:
-        part = NEAR_PART
     return min(increment, left, max(part * expected, SMALLEST_INCREMENT))
 
 
@@ -290,8 +290,8 @@ def _advance(
     where units met for which the tangent has no room. For the rest see `_leave`.
 
     Returns:
-        the fraction of the way reached, with ``motion`` there; the kind of the way; and where on it
-        the path ended, NaN if it did not.
+        the fraction of the way reached, with ``motion`` there; the kind of the way, that of its
+        first end; and where on it the path ended last, NaN if it did not.
     """
     _towards(motion, load, 1.0, system, work)
     way = _length(work.product, system.held, system)
@@ -314,28 +314,31 @@ def _advance(
             pace[RATE] = (value**2 - pace[VALUE] ** 2) / max(gone * way, 1e-300)
             pace[VALUE] = value
             pace[INCREMENT] = min(1.0, max(pace[INCREMENT] if last else CLOSE, change * gone))
-            continue
-        motion[:] = work.saved
-        pace[INCREMENT] = min(change, 0.9) * gone
-        if factorise_shifted(motion, system, work, counts) < 0.0:
-            break
-        if pace[INCREMENT] < SMALLEST_INCREMENT:
-            if not leaves:
-                _note(snaps, number + done)
-                return done, LIMIT_POINT, done
-            beyond = min(1.0, CLOSE / (1.0 - done))
-            share, end = _leave(
-                motion, load, beyond, mode, sense, pace[FIRST], drag, relative, absolute, system,
-                work, counts,
-            )  # fmt: skip
-            if share < 0.0:
+            if value > SINGULAR * pace[FIRST] or done == 1.0:
+                continue
+        else:
+            motion[:] = work.saved
+            pace[INCREMENT] = min(change, 0.9) * gone
+            if factorise_shifted(motion, system, work, counts) < 0.0:
                 break
-            if end != SMOOTH:
-                kind, ended = end, done
-                _note(snaps, number + done)
-            done = 1.0 if share == 1.0 else done + share * (1.0 - done)
-            pace[INCREMENT], pace[RATE] = CLOSE, 0.0
-            pace[VALUE] = lowest_mode(system, work, mode, SWEEPS, 0.0)
+            if pace[INCREMENT] >= SMALLEST_INCREMENT:
+                continue
+        if not leaves:
+            _note(snaps, number + done)
+            return done, LIMIT_POINT, done
+        beyond = min(1.0, CLOSE / (1.0 - done))
+        share, end = _leave(
+            motion, load, beyond, mode, sense, pace[FIRST], drag, relative, absolute, system,
+            work, counts,
+        )  # fmt: skip
+        if share < 0.0:
+            break
+        if end != SMOOTH:
+            kind, ended = end if kind == SMOOTH else kind, done
+            _note(snaps, number + done)
+        done = 1.0 if share == 1.0 else done + share * (1.0 - done)
+        pace[INCREMENT], pace[RATE] = CLOSE, 0.0
+        pace[VALUE] = lowest_mode(system, work, mode, SWEEPS, 0.0)
     return done, kind, ended
 
 
@@ -437,12 +440,15 @@ def follow(
                 motion, loads[p], p, leaves, sense, pace, mode, step, drag, relative, absolute,
                 system, work, branch.snaps, counts,
             )  # fmt: skip
-            branch.jumped[p] = max(kind, branch.jumped[p])
+            if branch.jumped[p] == SMOOTH:
+                branch.jumped[p] = kind
             if not np.isnan(ended):  # that of coming to rest stays where the way is smooth
                 branch.snapped[p] = ended
         branch.states[p] = motion
         if done < 1.0 or units_met(system.contacts):
             return p, done
+        # of a symmetric structure the last mode has nothing of one that has crossed it
+        mode += SCATTER / np.sqrt(len(mode)) * np.sin(1.0 + np.arange(len(mode)))
         pace[VALUE] = lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE)
         branch.eigenvalue[p], branch.stable[p] = pace[VALUE], 1
     return len(loads), 0.0

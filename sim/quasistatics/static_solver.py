@@ -142,7 +142,7 @@ class StaticSolver:
             branch.states[last].copy(),
             branch.tangents[last].copy(),
             branch.stable[last].copy(),
-            branch.jumped.reshape(-1, self.substeps).max(axis=1),
+            _first_kinds(branch.jumped.reshape(-1, self.substeps)),
             np.fmax.reduce(snapped, axis=1),
             branch.eigenvalue[last].copy(),
             counts,
@@ -198,3 +198,8 @@ def _forget(branch: Branch, known: int) -> None:
     branch.jumped[known:] = 0
     branch.snapped[known:] = np.nan
     branch.snaps[branch.snaps >= known] = np.nan
+
+
+def _first_kinds(jumped: Ints) -> Ints:
+    """Takes from rows (n_times, substeps) the first kind that is no smooth way, or 0."""
+    return jumped[np.arange(len(jumped)), (jumped > 0).argmax(axis=1)]

@@ -170,12 +170,39 @@ def test_a_snap_ends_where_damped_motion_comes_to_rest() -> None:
     np.testing.assert_allclose(found.y[:, -1], after[free], rtol=0, atol=1e-5)
 
 
-def test_the_eigenvalue_of_every_load_is_that_of_the_dense_tangent() -> None:
-    rig = squeezed(9.0)
-    solver = StaticSolver(rig.topology, np.array([0.3, 0.7, 1.0]))
+@pytest.mark.parametrize("squeeze", [(9.0, 5), (11.0, 6), (-8.0, 6)])
+def test_the_eigenvalue_of_every_load_is_that_of_the_dense_tangent(
+    squeeze: tuple[float, int],
+) -> None:
+    """Also where another mode becomes the lowest, to which a symmetric one is orthogonal."""
+    rig = squeezed(*squeeze)
+    solver = StaticSolver(rig.topology, np.arange(1, 21) / 20)
     record = solver.forward(rig.values, rig.drive)[2]
     scale = rig.topology.scale[rig.topology.free_dofs]
     for state, value in zip(record.states, record.eigenvalue, strict=True):
         stiffness = linearised(rig.topology, rig.values, state.reshape(-1, 3)).stiffness.toarray()
         spectrum = np.linalg.eigvalsh(stiffness / np.outer(scale, scale))
-        assert value == pytest.approx(spectrum[0], rel=1e-4)
+        # within few sweeps modes do not part that are closer than that
+        near = spectrum[1] < 1.1 * spectrum[0]
+        assert value == pytest.approx(spectrum[0], rel=0.1 if near else 1e-4)
+
+
+@pytest.mark.parametrize("count", [2, 32, 53, 60, 72, 89, 102, 116, 124, 127])
+def test_a_branching_is_not_passed_whatever_the_loads(count: int) -> None:
+    """Beside it a state is all but free along the critical mode, and rounding chooses a side."""
+    rig = squeezed(11.0, 6)
+    record = StaticSolver(rig.topology, np.arange(1, count + 1) / count).forward(
+        rig.values, rig.drive
+    )[2]
+    np.testing.assert_allclose(record.snaps, [0.70405, 0.97762], atol=1e-5)
+
+
+def test_the_kind_of_a_way_is_that_of_its_first_snap() -> None:
+    rig = squeezed(15.0, 8, bias_deg=0.0)
+    few, many = (
+        StaticSolver(rig.topology, np.arange(1, count + 1) / count).forward(rig.values, rig.drive)[
+            2
+        ]
+        for count in (1, 20)
+    )
+    assert few.jumped.tolist() == [many.jumped[many.jumped > 0][0]] == [BRANCHING]
