@@ -269,6 +269,12 @@ def _step_ahead(
 
 
 @inlined
+def _first_kind(before: int, end: int) -> int:
+    """Kind of a way whose ends so far were of one kind, and the next is of another."""
+    return end if before == SMOOTH else before
+
+
+@inlined
 def _note(snaps: Floats, place: float) -> None:
     for i in range(len(snaps)):
         if np.isnan(snaps[i]):
@@ -334,7 +340,7 @@ def _advance(
         if share < 0.0:
             break
         if end != SMOOTH:
-            kind, ended = end if kind == SMOOTH else kind, done
+            kind, ended = _first_kind(kind, end), done
             _note(snaps, number + done)
         done = 1.0 if share == 1.0 else done + share * (1.0 - done)
         pace[INCREMENT], pace[RATE] = CLOSE, 0.0
@@ -440,8 +446,7 @@ def follow(
                 motion, loads[p], p, leaves, sense, pace, mode, step, drag, relative, absolute,
                 system, work, branch.snaps, counts,
             )  # fmt: skip
-            if branch.jumped[p] == SMOOTH:
-                branch.jumped[p] = kind
+            branch.jumped[p] = _first_kind(branch.jumped[p], kind)
             if not np.isnan(ended):  # that of coming to rest stays where the way is smooth
                 branch.snapped[p] = ended
         branch.states[p] = motion
