@@ -4,6 +4,8 @@ import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from pipeline import datasets
 from pipeline.datasets.tables import Kind
 from pipeline.runtime import UserError
@@ -23,15 +25,20 @@ def join_parts(paths: Sequence[Path], kind: Kind, dim: str, out: Path) -> None:
     """Writes the parts as one dataset, in the order of ``dim``.
 
     Raises:
-        UserError: a part belongs to another design.
+        UserError: a part belongs to another design or problem, or is there twice.
     """
     import xarray as xr
 
     parts = [datasets.read(path, kind) for path in paths]
     for path, read in zip(paths, parts, strict=True):
-        if read.attrs["parents"] != parts[0].attrs["parents"]:
-            raise UserError(
-                "the part belongs to another design", file=path, remedy="remove it and run again"
-            )
+        for name, of in (("parents", "design"), ("problem_hash", "problem")):
+            if read.attrs[name] != parts[0].attrs[name]:
+                what = f"the part belongs to another {of}"
+                raise UserError(what, file=path, remedy="remove it and run again")
+    numbers = np.concatenate([read[dim].values for read in parts])
+    if len(np.unique(numbers)) < len(numbers):
+        raise UserError(
+            "a part is there twice", file=out, remedy="give each part once", key="--parts"
+        )
     whole = xr.concat(parts, dim=dim, combine_attrs="drop_conflicts").sortby(dim)
     datasets.write(whole, out, kind, dict(parts[0].attrs))

@@ -49,7 +49,10 @@ def results(
     except SettingError as error:
         raise UnposedError(str(error)) from error
     target = None if scene.objective.reference is None else target_motion(scene, threads)
-    structures = structures_of(scene, design)
+    try:
+        structures = structures_of(scene, design)
+    except UserError as error:
+        raise UnposedError(error.what) from error
     altered, cloaked = (
         _simulated(structures[name], target, threads) for name in ("altered", "cloaked")
     )

@@ -96,12 +96,14 @@ def certificate(
             tried = TriedDesign(*structure, family, journal, threads, bar.update)
             rows.append((tried.losses(loads), tried.losses(own), tried.searches(starts)))
     losses, nominal, found = (np.array(part) for part in zip(*rows, strict=True))
+    ends = found[..., -1]
     made = xr.Dataset(
         {
             **_numbers("load", ("load",), family, loads),
             "loss": (("design", "load"), losses),
             **_numbers("found", ("design", "search"), family, found[..., :-1]),
-            "found_loss": (("design", "search"), found[..., -1]),
+            # a search may have come to no load that can be simulated
+            "found_loss": (("design", "search"), np.where(np.isfinite(ends), ends, np.nan)),
             "nominal_loss": (("design",), nominal @ scene.loads.case_weights),
             "nominal_worst": (("design",), nominal.max(axis=1)),
         },

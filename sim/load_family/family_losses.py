@@ -270,6 +270,8 @@ class _Octave:
         number: int,
         own_amplitude: float,
     ) -> None:
+        if scene.objective.reaction > 0.0:
+            raise ValueError("over loads in ranges motions alone are mimicked, not forces")
         scene = setup.posed(scene)
         fastest, duration, top = setup.fastest(number), scene.loads.duration, None
         if isinstance(fastest, Harmonic):

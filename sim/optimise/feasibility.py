@@ -104,6 +104,6 @@ def feasible_start(problem: CountedProblem, x: Floats, reach: float) -> Constrai
         place = project(problem, x, factor * reach, rounds=50, patience=50)
         if place is not None:
             return place
-    start = problem.place(x)
+    start = problem.place(np.clip(x, problem.lower, problem.upper))
     worst = int(np.argmin(start.values))
     raise InfeasibleStartError(worst, -float(start.values[worst]))

@@ -132,6 +132,8 @@ class _Run:
     def __init__(self, problem: CountedProblem, point: EvaluatedPoint, options: MmaOptions) -> None:
         self.problem, self.options, self.point = problem, options, point
         width = problem.upper - problem.lower
+        if not (width > 0.0).all():
+            raise ValueError("MMA needs room between the bounds of every variable: leave it out")
         self.width = np.where(np.isfinite(width), width, options.span)
         self.distance = options.asymptote * self.width
         self.stiffness = np.ones(1 + len(point.values))

@@ -35,7 +35,7 @@ class InfeasibleStartError(ValueError):
     """No design that meets all constraints was found near the start.
 
     Attributes:
-        constraint: index of the most violated constraint at the closest design found.
+        constraint: index of the most violated constraint at the start, within its bounds.
         violation: by how much.
     """
 

@@ -163,6 +163,22 @@ def _turned(problem: Problem, ranges: LoadRanges | TestSetup) -> Problem:
     return problem.model_copy(update={"drive": drive})
 
 
+def _single_values(
+    problem: Problem, drive: DisplacementDrive, ranges: LoadRanges | TestSetup, place: KeyPath
+) -> Findings:
+    """Finds ranges of one value that the drive does not have: its own loads are of the family."""
+    own = {
+        "directions": drive.directions,
+        "amplitude": (getattr(drive, "amplitude", None),),
+        "frequency": (problem.frequency,),
+    }
+    for name, values in own.items():
+        low, high = getattr(ranges, name) or (0.0, 1.0)
+        if low == high and any(value is not None and value != low for value in values):
+            what = "one value, which is not the drive's"
+            yield ProblemFault(what, (*place, name), "give the drive's, or a range that has it")
+
+
 def _ranges(problem: Problem, ranges: LoadRanges | TestSetup, place: KeyPath) -> Findings:
     """Finds ranges that the drive of a set-up does not have."""
     drive = problem.drive
@@ -181,3 +197,5 @@ def _ranges(problem: Problem, ranges: LoadRanges | TestSetup, place: KeyPath) ->
     elif ranges.frequency is not None and problem.horizon.periods is None:
         what = "a time does not fit loads of all frequencies"
         yield ProblemFault(what, ("horizon", "duration"), "give `periods`")
+    else:
+        yield from _single_values(problem, drive, ranges, place)

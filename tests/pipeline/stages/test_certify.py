@@ -13,6 +13,7 @@ from pipeline.stages import certify
 from reports.__main__ import main
 from reports.facts import claims
 from reports.facts.fact_records import read_json
+from sim.core import SimulationError
 from sim.load_family import LoadLosses
 from tests.pipeline import static
 from tests.pipeline.conftest import Failing
@@ -177,3 +178,28 @@ def test_set_ups_have_loads_of_their_own(fig2: Path) -> None:
     assert set(turned.scene.loads.clamped // 3).isdisjoint(turned.scene.loads.driven)
     middle = family.numbers(np.array([[0.5, 0.5, 5 / 6]]))
     np.testing.assert_allclose(middle, [[np.pi / 4, 11.25]])
+
+
+def test_searches_that_come_to_no_load_are_told(
+    fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unsolvable(*_: object) -> None:
+        raise SimulationError("no equilibrium")
+
+    monkeypatch.setattr(certify, "LOADS", 2)
+    monkeypatch.setattr(certify, "SEARCHES", 1)
+    path, out = write(fig2, tmp_path), tmp_path / "certificate.nc"
+    words = ["--problem", str(path), "--quiet", "--design", str(designed(path))]
+    monkeypatch.setattr(LoadLosses, "__call__", unsolvable)
+    assert run_stage("certify", [*words, "--out", str(out)]) == 0
+    data = datasets.read(out, "certificate")
+    assert np.isnan(data["found_loss"]).all()
+    assert np.isfinite(data["loss"]).all()
+
+
+def test_a_range_of_one_value_is_the_drives(fig2: Path, tmp_path: Path) -> None:
+    text = yaml.safe_load(write(fig2, tmp_path).read_text())
+    text["objective"]["loads"]["amplitude"] = ["2.5 mm", "2.5 mm"]
+    (tmp_path / "problem.yaml").write_text(yaml.safe_dump(text))
+    with refused("one value", "objective.loads.amplitude"):
+        load(tmp_path / "problem.yaml")

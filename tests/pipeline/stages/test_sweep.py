@@ -6,6 +6,7 @@ import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.__main__ import run_stage
+from pipeline.datasets import chunked
 from pipeline.posing import scene_of, setting_losses
 from pipeline.problem.sections import Sweep, sweep_cases
 from pipeline.runtime import CaseLog, SweepResult, UserError, case_log
@@ -177,3 +178,33 @@ def test_faulty_measured_constants_are_refused(line: str, told: str, tmp_path: P
     (tmp_path / "constants.csv").write_text(f"{DRAWS}120,1190,1.5\n{line}")
     with pytest.raises(UserError, match=told):
         problem.over_measured_constants(problem.load(path), tmp_path)
+
+
+def test_a_structure_that_cannot_rest_fails_its_case_alone(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def restless(*_: object) -> None:
+        raise UserError("the structure comes to no rest")
+
+    monkeypatch.setattr(setting_losses, "structures_of", restless)
+    asked = problem.load(folder / "problem.yaml")
+    design = datasets.read(folder / "design.nc", "design")
+    with pytest.raises(setting_losses.UnposedError, match="no rest"):
+        setting_losses.results(asked, {"drive.amplitude": "1 mm"}, folder, design, 1)
+
+
+def test_parts_keep_their_units_and_are_there_once(whole: xr.Dataset, tmp_path: Path) -> None:
+    parts = [tmp_path / "sweep_0.nc", tmp_path / "sweep_1.nc"]
+    for path, some in zip(parts, (slice(0, 3), slice(3, None)), strict=True):
+        part = whole.isel(case=some)
+        part["loss"].attrs["units"] = "N mm"
+        datasets.write(part, path, "sweep", dict(whole.attrs))
+    chunked.join_parts(parts, "sweep", "case", tmp_path / "sweep.nc")
+    assert datasets.read(tmp_path / "sweep.nc", "sweep")["loss"].attrs["units"] == "N mm"
+    with pytest.raises(UserError, match="twice"):
+        chunked.join_parts([*parts, parts[0]], "sweep", "case", tmp_path / "sweep.nc")
+    datasets.write(
+        whole.isel(case=[5]), parts[1], "sweep", whole.attrs | {"problem_hash": "0" * 16}
+    )
+    with pytest.raises(UserError, match="another problem"):
+        chunked.join_parts(parts, "sweep", "case", tmp_path / "sweep.nc")

@@ -306,3 +306,9 @@ def test_a_share_of_the_own_loads_counts_in_which_design_is_best(
     monkeypatch.setattr(exchange, "minimise_loss", descend)
     monkeypatch.setattr(exchange, "search_worst", lambda *_: [FoundLoad(place, next(worst), place)])
     assert minimised(nominal=0.9).best < 4
+
+
+def test_forces_are_not_mimicked_over_loads_in_ranges() -> None:
+    made = mimicked().updated(reaction=0.5)
+    with pytest.raises(ValueError, match="motions alone"):
+        LoadLosses(made, PUSHED, parameters_of_design(made)).value(design_of(made), np.zeros(2))

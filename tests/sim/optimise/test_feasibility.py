@@ -1,7 +1,8 @@
 import numpy as np
+import pytest
 
 from sim.core import Floats
-from sim.optimise import feasible_design
+from sim.optimise import InfeasibleStartError, feasible_design, minimise
 
 
 def test_a_projection_that_leads_nowhere_is_given_up() -> None:
@@ -23,3 +24,14 @@ def test_a_design_outside_is_moved_to_the_nearest_one_inside() -> None:
     found = feasible_design(outside_of_a_circle, np.array([1.14, 1.52]), 1.0, 20)
     assert found is not None
     np.testing.assert_allclose(found, [1.2, 1.6], atol=5e-3)
+
+
+def test_a_start_is_told_where_its_bounds_put_it() -> None:
+    def constrain(x: Floats) -> tuple[Floats, Floats]:
+        return x - 5.0, np.ones((1, 1))
+
+    def loss(x: Floats) -> tuple[float, Floats, Floats]:
+        return float(x[0]), np.ones(1), np.zeros(0)
+
+    with pytest.raises(InfeasibleStartError, match="constraint 0 by 4"):
+        minimise("sqp", loss, constrain, np.array([6.0]), (0.0, 1.0))

@@ -122,3 +122,11 @@ def test_designs_whose_constraints_cannot_be_evaluated_are_avoided() -> None:
     found = minimise("mma", loss, constraints, np.zeros(2), (-2.0, 2.0), options)
     assert 0.5 < found.x[0] <= 0.6
     assert found.loss < 0.2 * found.evaluations[0].loss
+
+
+def test_a_fixed_variable_is_refused() -> None:
+    known = rosenbrock_in_disc()
+    room = np.array([1.0, 0.0])
+    bounds = known.start - room, known.start + room
+    with pytest.raises(ValueError, match="leave it out"):
+        minimise("mma", known.loss, known.constraints, known.start, bounds)
