@@ -10,6 +10,8 @@ from .checks import stability_facts as stability_facts
 from .claims import MEASURED as MEASURED
 from .claims import JudgedClaim as JudgedClaim
 from .design_tables import Columns as Columns
+from .design_tables import headed as headed
+from .design_tables import headed_columns as headed_columns
 from .design_tables import history as history
 from .design_tables import vertices as vertices
 from .fact_records import ABSENT as ABSENT

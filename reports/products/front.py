@@ -12,6 +12,7 @@ from pipeline import datasets, problem
 from pipeline.posing import greatest_loss
 from pipeline.problem.sections import designs, split_name, split_value
 from reports.base import Table, prose, style
+from reports.facts import headed_columns
 from reports.page import FigureText, PageTable, figure_page, publish, titled
 from reports.panels import Panel, PanelFigure
 from sim.core import Floats
@@ -71,7 +72,7 @@ def front_figure(data: xr.Dataset, certified: Mapping[str, xr.Dataset]) -> Panel
     series.sort(key=lambda each: _parameter(each) != designs.SHARE)
     count = 2 if len(series) == PER_ROW + 1 else PER_ROW
     each_wide = (style.TWO_COLUMNS + _GAP) / count
-    columns = {str(name): data[name].values for name in data.variables}
+    columns = headed_columns(data, *map(str, data.variables))
     table = Table("front.csv", "losses of every design", columns)
     panels = []
     for k, each in enumerate(series):

@@ -10,6 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from pipeline import datasets, problem
 from reports.base import Table, prose, style
+from reports.facts import headed_columns
 from reports.page import FigureText, PageTable, figure_page, publish, titled
 
 _PROSE = prose(__file__)
@@ -28,7 +29,7 @@ _AGAINST = {
 def report(args: argparse.Namespace) -> None:
     """Makes the report that a command line asks for."""
     data = datasets.read(args.gains, "gains")
-    columns = {str(name): data[name].values for name in data.variables if data[name].dims}
+    columns = headed_columns(data, *(str(name) for name in data.variables if data[name].dims))
     lead = _PROSE["lead"].format(loss=float(data["loss_drive"]))
     title = titled(problem.load(args.problem), args.problem)
     text = FigureText(title, _PROSE["subject"], lead, _PROSE["caption"])

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from pipeline import datasets, problem
 from pipeline.problem import Problem
 from reports.base import Table, prose, style
+from reports.facts import headed
 from reports.page import FigureText, figure_page, publish, titled
 from reports.panels import draw
 from reports.study import from_dataset, study_results
@@ -46,7 +47,12 @@ def report(args: argparse.Namespace) -> None:
 
 def _columns(values: xr.DataArray) -> dict[str, list[object]]:
     frame = values.rename("value").to_dataframe().reset_index()
-    return {str(column): frame[column].tolist() for column in (*values.dims, "value")}
+    units = {str(name): values[name].attrs.get("units", "1") for name in values.coords}
+    units["value"] = values.attrs.get("units", "1")
+    return {
+        headed(str(column), units.get(str(column), "1")): frame[column].tolist()
+        for column in (*values.dims, "value")
+    }
 
 
 def draw_spectrum(data: xr.Dataset, asked: Problem) -> Figure:

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from reports.base import Table
-from reports.facts import Columns, history, vertices
+from reports.facts import Columns, headed, headed_columns, history, vertices
 from reports.figures.loading_path import measures, monte_carlo
 from reports.figures.loading_path.abscissa import abscissa_of, load_names, structures
 from reports.figures.loading_path.drive_response import drive_response
@@ -51,23 +51,18 @@ def path(study: StudyResults) -> Columns:
         name = (
             "displacement" if way.displaces else way.name.lower().replace(",", "").replace(" ", "_")
         )
-        columns[_column(name, way.unit)] = way.values
+        columns[headed(name, way.unit)] = way.values
     answer = drive_response(problem)
     series = {
-        _column(measure.key, measure.unit): measure.of(response),
+        headed(measure.key, measure.unit): measure.of(response),
         "contraction_mm": measures.contraction(problem, response),
-        _column(answer.key, answer.unit): answer.of(response),
+        headed(answer.key, answer.unit): answer.of(response),
         "strain_energy_Nmm": response["strain_energy"],
         "contact_energy_Nmm": response["contact_energy"],
         "min_void_angle_rad": response["min_void_angle"],
         "eigenvalue_N_per_mm": response["eigenvalue"],
     }
     return columns | by_structure(study, series)
-
-
-def _column(name: str, unit: str) -> str:
-    """Names a column by its quantity and unit."""
-    return f"{name}_{unit.replace(' ', '').replace('°', 'deg')}"
 
 
 def copies(study: StudyResults, made: xr.Dataset) -> Columns:
@@ -79,9 +74,8 @@ def copies(study: StudyResults, made: xr.Dataset) -> Columns:
     columns: Columns = {
         "noise": noise.ravel(),
         "sample": sample.ravel(),
-        _column(measure.key, measure.unit): values.values.ravel(),
+        headed(measure.key, measure.unit): values.values.ravel(),
         "reaction_N": made["reaction"].isel(time=-1).values.ravel(),
     }
-    for name in ("loss", "min_void_angle", "clashes", "redrawn", "status"):
-        columns[name] = made[name].values.ravel()
-    return columns
+    numbers = ("loss", "min_void_angle", "clashes", "redrawn", "status")
+    return columns | headed_columns(made, *numbers)

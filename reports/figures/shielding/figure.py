@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from reports.base import Table, prose, style
-from reports.facts import Columns, Fact, history, measures, vertices
+from reports.facts import Columns, Fact, headed, history, measures, vertices
 from reports.figures.shielding.curves import loss_panel, map_panel, motion_panel
 from reports.figures.shielding.facts import MONITORED, monitored_recordings
 from reports.figures.shielding.structure_panels import (
@@ -183,8 +183,9 @@ def _map(sweep: xr.Dataset) -> Columns:
     for column, name in (
         ("J_cloaked", "loss"),
         ("J_altered", "loss_altered"),
-        ("min_void_angle_rad", "min_void_angle"),
+        ("min_void_angle", "min_void_angle"),
         ("status", "status"),
     ):
-        columns[column] = sweep[name].transpose("direction", "frequency").values.ravel()
+        values = sweep[name].transpose("direction", "frequency")
+        columns[headed(column, values.attrs.get("units", "1"))] = values.values.ravel()
     return columns

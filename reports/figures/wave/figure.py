@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reports.base import Table, prose, style
-from reports.facts import Columns
+from reports.facts import Columns, headed_columns
 from reports.figures.loading_path import (
     TALLEST_SNAPSHOTS,
     SnapshotLayout,
@@ -156,6 +156,6 @@ def _steps(verification: xr.Dataset | None) -> list[Table]:
     checks, names = verification["check"].values, verification["structure"].values
     check, structure = np.meshgrid(checks, names, indexing="ij")
     columns: Columns = {"check": check.ravel(), "structure": structure.ravel()}
-    for field in ("time_step", "loss", "error", "departure", "min_void_angle", "gap", "overlaps"):
-        columns[field] = verification[field].values.ravel()
+    told = ("time_step", "loss", "error", "departure", "min_void_angle", "gap", "overlaps")
+    columns |= headed_columns(verification, *told)
     return [Table("steps.csv", "loss and error with shorter steps", columns)]

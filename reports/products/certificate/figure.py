@@ -13,6 +13,7 @@ from matplotlib.ticker import MultipleLocator
 from pipeline.posing import greatest_loss, worst_load
 from pipeline.problem.sections import SeveralDrives
 from reports.base import Table, prose, style
+from reports.facts import headed
 from reports.panels import (
     CLAMP_TINT,
     CLOAK_TINT,
@@ -168,7 +169,8 @@ def _tables(data: xr.Dataset) -> list[Table]:
 def _series(found: CertifiedDesign) -> dict[str, Floats]:
     columns = {"time_s": found.missed["time"].values}
     for name in _structures(found):
-        columns[f"missed_{name}"] = found.missed.sel(structure=name).values
+        missed = found.missed.sel(structure=name)
+        columns[headed(f"missed_{name}", missed.attrs.get("units", "1"))] = missed.values
     return columns
 
 

@@ -17,6 +17,7 @@ from pipeline.datasets.tables import Kind
 from pipeline.problem.fields import SIM_UNITS
 from pipeline.runtime import UserError
 from reports.base import Table
+from reports.facts import headed_columns
 from reports.page import PageTable, Report, publish
 from reports.products.validation import pictures
 from reports.products.validation.figures import LIMIT, draw_cycles, draw_samples
@@ -322,13 +323,11 @@ def _checks(made: xr.Dataset) -> PageTable | None:
 
 
 def _tables(made: xr.Dataset) -> list[Table]:
-    def columns(*names: str) -> dict[str, Any]:
-        return {name: made[name].values for name in names}
-
     told = ("displacement", "measured", "simulated", "median", "low", "high")
+    covered = ("covered", "relative_width")
     left = ("without", "left_out_curve", "left_out_inside", "left_out_half_width")
     return [
-        Table("prediction.csv", "Prediction beside the measurement, mm and N", columns(*told)),
-        Table("left_out.csv", "Curves left out of the fit", columns(*left)),
-        Table("coverage.csv", "Simulated sets of samples", columns("covered", "relative_width")),
+        Table("prediction.csv", "Prediction beside the measurement", headed_columns(made, *told)),
+        Table("left_out.csv", "Curves left out of the fit", headed_columns(made, *left)),
+        Table("coverage.csv", "Simulated sets of samples", headed_columns(made, *covered)),
     ]

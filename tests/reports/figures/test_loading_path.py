@@ -320,9 +320,9 @@ def test_a_motion_in_time_has_a_report_of_its_own(study: StudyResults, tmp_path:
     without = study.problem.model_copy(update={"sweep": None})
     publish(study_report(dataclasses.replace(study, problem=without, datasets=plain)), tmp_path)
     columns = (tmp_path / "path.csv").read_text(encoding="utf-8").partition("\n")[0].split(",")
-    assert "altered_motion_1" in columns
+    assert "altered_motion" in columns
     assert "displacement_mm" not in columns
-    curve = np.genfromtxt(tmp_path / "path.csv", delimiter=",", names=True)["altered_motion_1"]
+    curve = np.genfromtxt(tmp_path / "path.csv", delimiter=",", names=True)["altered_motion"]
     told = json.loads((tmp_path / "facts.json").read_text(encoding="utf-8"))
     (found,) = [fact["value"] for fact in told if fact["key"] == "motion_altered"]
     assert found == pytest.approx(np.sqrt(np.mean(curve**2)), rel=1e-4)  # not that at its end
