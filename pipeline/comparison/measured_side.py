@@ -12,7 +12,7 @@ from pipeline.datasets.tables import TABLES
 from pipeline.posing import CLAMPED, DRIVEN
 from pipeline.runtime import UserError
 from pipeline.tracking.geometry import outlines_of_design
-from pipeline.tracking.output import driven_units, mean_over_seen
+from pipeline.tracking.output import drive_displacement, driven_units
 from sim.core import Floats, Ints, Mask
 
 MOST_FRAMES = 600
@@ -65,7 +65,7 @@ def prepare_measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
         centre=centre,
         registration=found,
         track=turned,
-        drive=mean_over_seen(displacement[:, driven_units(design), :2]),
+        drive=drive_displacement(displacement, design),
         force=shown["load_force"].values,
     )
 

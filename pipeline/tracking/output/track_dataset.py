@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from pipeline.datasets.tables import TABLES
 from pipeline.runtime import write_atomically
@@ -62,8 +63,8 @@ def label_track(design: xr.Dataset, time: Floats, variables: Mapping[str, object
         "dof": (("dof",), ["ux", "uy", "theta"]),
     }
     made = xr.Dataset({"vertices": design["vertices"], **variables}, coordinates)
-    driven = made["displacement"].values[:, driven_units(design), :2]
-    return made.assign_coords(drive_displacement=(("time", "xy"), mean_over_seen(driven)))
+    drive = drive_displacement(made["displacement"].values, design)
+    return made.assign_coords(drive_displacement=(("time", "xy"), drive))
 
 
 def driven_units(design: xr.Dataset) -> Mask:
@@ -72,11 +73,32 @@ def driven_units(design: xr.Dataset) -> Mask:
     return np.asarray(design["support"].values == flag)
 
 
-def mean_over_seen(motion: Floats) -> Floats:
-    """Averages (frames, 2) over units (frames, units, 2) that are seen; NaN without."""
-    seen = np.isfinite(motion[..., :1])
-    total = np.where(seen, motion, 0.0).sum(axis=1)
-    return np.where(seen.any(axis=1), total / np.maximum(seen.sum(axis=1), 1), np.nan)
+def drive_displacement(displacement: Floats, design: xr.Dataset) -> Floats:
+    """Averages displacements (frames, units, 3) over the driven units: (frames, 2), NaN without.
+
+    Where some were lost they are placed by the rigid motion of those that are seen: the mean over
+    these alone would jump, as a grip is never quite straight.
+    """
+    driven = driven_units(design)
+    start = design["vertices"].mean("vertex").transpose("unit", "xy").values[driven]
+    moved = displacement[:, driven, :2] @ [1.0, 1j]
+    place = start @ [1.0, 1j]
+    mean = np.array([_mean_of_rigid(each, place) for each in moved])
+    return np.stack([mean.real, mean.imag], axis=-1)
+
+
+def _mean_of_rigid(moved: NDArray[np.complex128], place: NDArray[np.complex128]) -> complex:
+    """Averages displacements of units at places, x + iy; of those lost, by a rigid motion."""
+    seen = np.isfinite(moved)
+    if not seen.any():
+        return complex(np.nan, np.nan)
+    middle, mean = place[seen].mean(), moved[seen].mean()
+    arm = place[seen] - middle
+    # z' = mean + t arm, |t| = 1, of least squares
+    turn = np.vdot(arm, arm + moved[seen] - mean)
+    turn = turn / abs(turn) if abs(turn) > 0.0 else 1.0
+    lost = mean + (turn - 1.0) * (place - middle)
+    return complex(np.where(seen, moved, lost).mean())
 
 
 def _over_all_units(values: np.ndarray, present: np.ndarray, fill: float) -> np.ndarray:
