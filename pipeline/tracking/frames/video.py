@@ -229,7 +229,8 @@ def _decoded(
                 raise
             raise broken_off(path, str(error.strerror), index, time) from error
         if frame is None:
-            if index < _ALL * _promised(container, stream, (index - 1) / max(time, 1e-9)):
+            rate = (index - 1) / time if time > 0 else float(stream.average_rate or 0)
+            if index < _ALL * _promised(container, stream, rate):
                 raise broken_off(path, "the file should go on", index, time)
             return
         stamp = index / float(stream.average_rate or 1) if frame.pts is None else float(frame.time)
@@ -243,10 +244,28 @@ def _decoded(
 
 
 def _promised(container: av.container.InputContainer, stream: av.VideoStream, rate: float) -> float:
-    """Returns the number of frames as the file has it; zero where it does not tell."""
-    if stream.frames or len(container.streams) > 1 or not container.duration:
-        return float(stream.frames)
-    return rate * container.duration / av.time_base - 1
+    """Computes how many frames there are at least by the file; zero where it does not tell.
+
+    Of a rate, those of its duration are as many: an edit list shows less than is held, and a frame
+    that a camera drops may be counted.
+    """
+    duration = _duration(container, stream)
+    told = [float(stream.frames)] if stream.frames else []
+    return min([*told, rate * duration - 1] if duration else told, default=0.0)
+
+
+def _duration(container: av.container.InputContainer, stream: av.VideoStream) -> float:
+    """Reads how long the frames are shown by the file, s; zero where it does not tell.
+
+    An AVI counts the places of frames, and is taken to be as long as its size tells if it is cut.
+    """
+    if container.format.name == "avi" and stream.average_rate:
+        return float(stream.frames / stream.average_rate)
+    if stream.duration and stream.time_base:
+        return float(stream.duration * stream.time_base)
+    if len(container.streams) > 1 or not container.duration:
+        return 0.0
+    return (container.duration - max(container.start_time or 0, 0)) / av.time_base
 
 
 def _upright(image: Picture, rotation: float) -> Picture:

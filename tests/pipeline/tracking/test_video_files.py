@@ -1,0 +1,83 @@
+"""Files as cameras, phones and editors write them: what they hold, and when it was seen."""
+
+import struct
+from fractions import Fraction
+from pathlib import Path
+from typing import cast
+
+import av
+import numpy as np
+import pytest
+
+from pipeline.tracking.frames import BrokenOffError, read_frames
+from sim.core import Image
+
+RATE = 30
+FLAT = np.full((64, 64), 90, np.uint8)
+
+
+def written(
+    path: Path, numbers: list[int], codec: str = "libx264", image: Image = FLAT, rate: int = RATE
+) -> Path:
+    """Writes one picture at those of the instants of a rate that have these numbers."""
+    ahead = {"movflags": "faststart"} if path.suffix == ".mp4" else {}
+    with av.open(str(path), "w", options=ahead) as container:
+        stream = cast("av.VideoStream", container.add_stream(codec, rate=rate))
+        stream.height, stream.width = image.shape
+        stream.pix_fmt = {"mjpeg": "yuvj420p", "ffv1": "gray"}.get(codec, "yuv420p")
+        stream.codec_context.time_base = Fraction(1, rate)
+        for number in numbers:
+            frame = av.VideoFrame.from_ndarray(image, format="gray")
+            frame.pts, frame.time_base = number, Fraction(1, rate)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    return path
+
+
+def cut_after(path: Path, part: float) -> Path:
+    """Cuts a file off behind a part of its packets, at the end of one."""
+    with av.open(str(path)) as container:
+        found = [(packet.pos, packet.size) for packet in container.demux(video=0)]
+    with path.open("r+b") as file:
+        ends = sorted(place + size for place, size in found if place is not None)
+        file.truncate(ends[round(part * len(ends))])
+    return path
+
+
+def trimmed(path: Path, first: float, shown: float) -> Path:
+    """Lets the edit list of an MP4 show so many seconds of what it holds, from one on."""
+    held = bytearray(path.read_bytes())
+    place = held.index(b"elst") + 12  # behind version and number of edits
+    media = struct.unpack_from(">I", held, held.index(b"mdhd") + 16)[0]
+    start = struct.unpack_from(">i", held, place + 4)[0] + round(first * media)
+    struct.pack_into(">Ii", held, place, round(1000 * shown), start)
+    path.write_bytes(held)
+    return path
+
+
+def test_dropped_frames_of_an_avi_break_nothing_off(tmp_path: Path) -> None:
+    kept = [number for number in range(100) if number % 8 != 5]
+    shown = list(read_frames(written(tmp_path / "a.avi", kept, "mjpeg")))
+    np.testing.assert_allclose([frame.time for frame in shown], np.array(kept) / RATE)
+
+
+@pytest.mark.parametrize("first", [0.0, 2.0])
+def test_what_a_phone_trimmed_is_not_missed(tmp_path: Path, first: float) -> None:
+    path = trimmed(written(tmp_path / "a.mp4", list(range(120))), first, 2.0)
+    assert len(list(read_frames(path))) == 60
+
+
+def test_a_clip_that_starts_late_is_whole(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.mkv", list(range(300, 330)), "ffv1")
+    shown = list(read_frames(path))
+    np.testing.assert_allclose([frame.time for frame in shown], np.arange(30) / RATE, atol=1e-3)
+
+
+@pytest.mark.parametrize(("name", "codec"), [("a.avi", "mjpeg"), ("a.mp4", "libx264")])
+@pytest.mark.parametrize("numbers", [list(range(120)), list(range(0, 120, 2))])
+def test_files_that_end_between_frames_break_off(
+    tmp_path: Path, name: str, codec: str, numbers: list[int]
+) -> None:
+    path = cut_after(written(tmp_path / name, numbers, codec), 0.6)
+    with pytest.raises(BrokenOffError, match="should go on"):
+        list(read_frames(path))
