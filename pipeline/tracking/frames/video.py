@@ -68,7 +68,7 @@ class Frame:
     """Holds a picture of the video."""
 
     index: int  # from zero
-    time: float  # since the file's first frame, s, by the file's time stamps
+    time: float  # since the file's first frame, s, by the rate that is given or the file's stamps
     image: Picture  # (rows, columns) brightness, from 0 to 255
 
 
@@ -81,14 +81,14 @@ def read_frames(
         path: the video, or a folder of pictures.
         start: of the time window, s; the first frame of the file is at zero.
         end: of the time window, s.
-        rate: frames per second of a folder of pictures.
+        rate: frames per second, in place of a video's own times; a folder of pictures has none.
 
     Raises:
         UserError: no such file, or none that can be read; a folder without a rate.
         BrokenOffError: after the frames that there are, if it breaks off or changes its size.
     """
     if not path.is_dir():
-        yield from _ahead(_even(path, _filmed(path, start, end)))
+        yield from _ahead(_even(path, _filmed(path, start, end, rate)))
         return
     if rate is None:
         remedy = "add how many were taken in a second, such as frame_rate: '30 Hz'"
@@ -147,10 +147,11 @@ def _pictured(path: Path, rate: float) -> Iterator[Frame]:
         raise broken_off(path, f"{error.file} cannot be read", count, (count - 1) / rate) from error
 
 
-def _filmed(path: Path, start: float, end: float) -> Iterator[Frame]:
+def _filmed(path: Path, start: float, end: float, rate: float | None) -> Iterator[Frame]:
     try:
         with _opened(path) as container:
-            yield from _decoded(container, path, start, end)
+            stream = _video_stream(container, path)
+            yield from _decoded(container, stream, path, (start, end), rate)
     except FileNotFoundError as error:
         raise UserError("no such video", file=path, key="video", remedy="check the path") from error
     except av.FFmpegError as error:
@@ -207,9 +208,7 @@ def _projected(frame: av.VideoFrame, axis: Floats) -> Picture:
     return np.asarray(np.clip(colour @ weights + np.float32(axis[3]), 0, WHITE), np.float32)
 
 
-def _decoded(
-    container: av.container.InputContainer, path: Path, start: float, end: float
-) -> Iterator[Frame]:
+def _video_stream(container: av.container.InputContainer, path: Path) -> av.VideoStream:
     # a file cut off within its index has a stream of which nothing tells how to decode it
     if not container.streams.video or container.streams.video[0].codec_context is None:
         raise UserError("the file holds no video", file=path, remedy="give a video file")
@@ -218,9 +217,33 @@ def _decoded(
         size = f"{stream.width} x {stream.height}"
         remedy = "give a smaller one, or one that is not broken"
         raise UserError(f"frames of {size} pixels are too large", file=path, remedy=remedy)
-    first: float | None = None
-    index, time = 0, 0.0
-    decoded, shades = iter(container.decode(stream)), _Shades()
+    return stream
+
+
+class _Clock:
+    """Tells times since the first frame, s: by the rate that is given, else by the stamps."""
+
+    def __init__(self, stream: av.VideoStream, rate: float | None) -> None:
+        self._usual, self._rate = float(stream.average_rate or 1), rate
+        self._first: float | None = None
+        self.lasted = 0.0  # by the stamps
+
+    def __call__(self, index: int, frame: av.VideoFrame) -> float:
+        stamp = index / self._usual if frame.pts is None else float(frame.time)
+        self._first = stamp if self._first is None else self._first
+        self.lasted = stamp - self._first
+        return self.lasted if self._rate is None else index / self._rate
+
+
+def _decoded(
+    container: av.container.InputContainer,
+    stream: av.VideoStream,
+    path: Path,
+    window: tuple[float, float],
+    rate: float | None,
+) -> Iterator[Frame]:
+    index, time, (start, end) = 0, 0.0, window
+    decoded, shades, clock = iter(container.decode(stream)), _Shades(), _Clock(stream, rate)
     while time < end:
         try:
             frame = next(decoded, None)
@@ -229,18 +252,23 @@ def _decoded(
                 raise
             raise broken_off(path, str(error.strerror), index, time) from error
         if frame is None:
-            rate = (index - 1) / time if time > 0 else float(stream.average_rate or 0)
-            if index < _ALL * _promised(container, stream, rate):
+            if _goes_on(container, stream, index, clock.lasted):
                 raise broken_off(path, "the file should go on", index, time)
             return
-        stamp = index / float(stream.average_rate or 1) if frame.pts is None else float(frame.time)
-        first = stamp if first is None else first
-        time = stamp - first
+        time = clock(index, frame)
         if time > end:
             return
         if time >= start:
             yield Frame(index, time, _upright(shades(frame), frame.rotation))
         index += 1
+
+
+def _goes_on(
+    container: av.container.InputContainer, stream: av.VideoStream, count: int, time: float
+) -> bool:
+    """Tells whether the file promises far more than so many frames, the last one at a time in s."""
+    rate = (count - 1) / time if time > 0 else float(stream.average_rate or 0)
+    return count < _ALL * _promised(container, stream, rate)
 
 
 def _promised(container: av.container.InputContainer, stream: av.VideoStream, rate: float) -> float:

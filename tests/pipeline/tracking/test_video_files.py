@@ -81,3 +81,16 @@ def test_files_that_end_between_frames_break_off(
     path = cut_after(written(tmp_path / name, numbers, codec), 0.6)
     with pytest.raises(BrokenOffError, match="should go on"):
         list(read_frames(path))
+
+
+def test_the_rate_that_is_given_is_that_of_the_camera(tmp_path: Path) -> None:
+    """A high-speed recording is often written to be played slowly; its window is in true time."""
+    path = written(tmp_path / "a.mp4", list(range(60)))
+    shown = list(read_frames(path, 0.01, 0.0295, 1000.0))
+    assert [frame.index for frame in shown] == list(range(10, 30))
+    np.testing.assert_allclose([frame.time for frame in shown], np.arange(10, 30) / 1000)
+    cut = cut_after(path, 0.6)
+    with pytest.raises(BrokenOffError, match="should go on") as caught:
+        list(read_frames(cut, rate=1000.0))
+    end = float(str(caught.value.remedy).split("end: ")[1].split(" s")[0])
+    assert 0.02 < end < 0.06
