@@ -81,21 +81,26 @@ def read_frames(
         path: the video, or a folder of pictures.
         start: of the time window, s; the first frame of the file is at zero.
         end: of the time window, s.
-        rate: frames per second, in place of a video's own times; a folder of pictures has none.
+        rate: frames per second, in place of a video's own times; folders of pictures and bare
+            streams have none.
 
     Raises:
-        UserError: no such file, or none that can be read; a folder without a rate.
+        UserError: no such file, or none that can be read; one without times or a rate.
         BrokenOffError: after the frames that there are, if it breaks off or changes its size.
     """
     if not path.is_dir():
         yield from _ahead(_even(path, _filmed(path, start, end, rate)))
         return
     if rate is None:
-        remedy = "add how many were taken in a second, such as frame_rate: '30 Hz'"
-        raise UserError("pictures have no times", file=path, key="frame_rate", remedy=remedy)
+        raise _untimed(path, "pictures have no times")
     shown = _pictured(path, rate)
     inside = takewhile(lambda frame: frame.time <= end, shown)
     yield from _even(path, (frame for frame in inside if start <= frame.time))
+
+
+def _untimed(path: Path, what: str) -> UserError:
+    remedy = "add how many were taken in a second, such as frame_rate: '30 Hz'"
+    return UserError(what, file=path, key="frame_rate", remedy=remedy)
 
 
 def frame_count(path: Path) -> int:
@@ -255,6 +260,8 @@ def _decoded(
             if _goes_on(container, stream, index, clock.lasted):
                 raise broken_off(path, "the file should go on", index, time)
             return
+        if index == 0 and rate is None and frame.pts is None:
+            raise _untimed(path, "the file holds no times of its frames")
         time = clock(index, frame)
         if time > end:
             return

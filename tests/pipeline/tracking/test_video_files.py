@@ -11,6 +11,7 @@ import pytest
 
 from pipeline.tracking.frames import BrokenOffError, read_frames
 from sim.core import Image
+from tests.tables import refused
 
 RATE = 30
 FLAT = np.full((64, 64), 90, np.uint8)
@@ -94,3 +95,12 @@ def test_the_rate_that_is_given_is_that_of_the_camera(tmp_path: Path) -> None:
         list(read_frames(cut, rate=1000.0))
     end = float(str(caught.value.remedy).split("end: ")[1].split(" s")[0])
     assert 0.02 < end < 0.06
+
+
+@pytest.mark.parametrize(("name", "codec"), [("a.h264", "libx264"), ("a.hevc", "libx265")])
+def test_a_bare_stream_has_no_times_but_by_a_rate(tmp_path: Path, name: str, codec: str) -> None:
+    path = written(tmp_path / name, list(range(8)), codec)
+    with refused("no times", "frame_rate", "frame_rate: '30 Hz'", path):
+        list(read_frames(path))
+    shown = list(read_frames(path, rate=30.0))
+    np.testing.assert_allclose([frame.time for frame in shown], np.arange(8) / 30)
