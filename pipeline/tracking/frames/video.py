@@ -85,7 +85,8 @@ def read_frames(
             streams have none.
 
     Raises:
-        UserError: no such file, or none that can be read; one without times or a rate.
+        UserError: no such file, or none that can be read; one without times or a rate; one that
+            is interlaced.
         BrokenOffError: after the frames that there are, if it breaks off or changes its size.
     """
     if not path.is_dir():
@@ -266,8 +267,19 @@ def _decoded(
         if time > end:
             return
         if time >= start:
+            _check_progressive(frame, path)
             yield Frame(index, time, _upright(shades(frame), frame.rotation))
         index += 1
+
+
+def _check_progressive(frame: av.VideoFrame, path: Path) -> None:
+    """Refuses a frame of two fields, whose odd rows show another instant than the even ones."""
+    if frame.interlaced_frame:
+        remedy = (
+            f"deinterlace it first, e.g. ffmpeg -i {path.name} -vf bwdif OUT.mp4, or, if the camera"
+            " took all rows at once, -vf setfield=prog"
+        )
+        raise UserError("the video is interlaced", file=path, key="video", remedy=remedy)
 
 
 def _goes_on(

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from pipeline.tracking.frames import BrokenOffError, read_frames
-from sim.core import Image
 from tests.tables import refused
 
 RATE = 30
@@ -18,17 +17,18 @@ FLAT = np.full((64, 64), 90, np.uint8)
 
 
 def written(
-    path: Path, numbers: list[int], codec: str = "libx264", image: Image = FLAT, rate: int = RATE
+    path: Path, numbers: list[int], codec: str = "libx264", rate: int = RATE, **options: object
 ) -> Path:
     """Writes one picture at those of the instants of a rate that have these numbers."""
     ahead = {"movflags": "faststart"} if path.suffix == ".mp4" else {}
     with av.open(str(path), "w", options=ahead) as container:
         stream = cast("av.VideoStream", container.add_stream(codec, rate=rate))
-        stream.height, stream.width = image.shape
+        stream.options = options
+        stream.height, stream.width = FLAT.shape
         stream.pix_fmt = {"mjpeg": "yuvj420p", "ffv1": "gray"}.get(codec, "yuv420p")
         stream.codec_context.time_base = Fraction(1, rate)
         for number in numbers:
-            frame = av.VideoFrame.from_ndarray(image, format="gray")
+            frame = av.VideoFrame.from_ndarray(FLAT, format="gray")
             frame.pts, frame.time_base = number, Fraction(1, rate)
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
@@ -104,3 +104,11 @@ def test_a_bare_stream_has_no_times_but_by_a_rate(tmp_path: Path, name: str, cod
         list(read_frames(path))
     shown = list(read_frames(path, rate=30.0))
     np.testing.assert_allclose([frame.time for frame in shown], np.arange(8) / 30)
+
+
+@pytest.mark.parametrize("codec", ["libx264", "mpeg2video"])
+def test_an_interlaced_video_is_refused(tmp_path: Path, codec: str) -> None:
+    """Its odd rows show another instant than the even ones."""
+    path = written(tmp_path / "a.mkv", list(range(4)), codec, flags="+ildct+ilme")
+    with refused("interlaced", "video", "ffmpeg -i a.mkv -vf bwdif", path):
+        list(read_frames(path))
