@@ -19,7 +19,12 @@ if TYPE_CHECKING:
 _LARGEST = 512 << 20
 _UNIT = re.compile(r"[\[(][^\])]+[\])]")
 _NUMBERS = re.compile(r"[\s\";]*[-+.]?\d")
-_HEADING = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\])]+)[\])]")
+_HEADING = re.compile(
+    r"(?P<name>.*?)\s*(?:(?P<bracket>[\[(])|(?<=\s)/\s+)(?P<unit>[^\])]+)(?(bracket)[\])])"
+)
+_ENDING = re.compile(r".+[\s_,/](?P<unit>[A-Za-zµ°]+)")
+_FOREIGN = re.compile("ns|ms|us|hrs?|hours?|lbs?|lbf|kip|ozf?|dyn|gf|kgf?|m?V|mm|cm|um|px")
+"""Units at the end of a name that are told from a word, whatever is wanted there."""
 
 
 class CsvCells(NamedTuple):
@@ -72,7 +77,8 @@ def read_columns(
     """Reads the named columns (lines, names); lines with gaps are left out.
 
     Lines above the heading are comments. Where the dimensions of columns are given, and the heading
-    or the line below it has units, numbers are converted to working units; else they are in these.
+    (as `NAME (UNIT)`, `NAME / UNIT` or `NAME_UNIT`) or the line below it (in brackets) has units,
+    numbers are converted to working units; else they are in these.
 
     Raises:
         UserError: no such file, no such column, a unit of another dimension, or no numbers in them.
@@ -86,8 +92,8 @@ def read_columns(
     factors: Floats = np.ones(len(names))
     for place, (name, dimension) in enumerate(zip(names, dimensions, strict=False)):
         title = cells.rows[heading - 1][named[name]]
-        if _HEADING.fullmatch(title):
-            factors[place] = _factor(title, dimension, name, path)
+        if (unit := _told_unit(title, dimension)) is not None:
+            factors[place] = _factor(unit, dimension, name, path)
     found = [[cells.number(row, named[name]) for name in names] for row in cells.rows[heading:]]
     kept = np.array([values for values in found if None not in values], float)
     if not len(kept):
@@ -99,8 +105,8 @@ def read_columns(
 def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: int = 1) -> Floats:
     """Reads the named columns (lines, names) in working units, of at least so many lines.
 
-    The heading names every column as `NAME (UNIT)`, or the units stand in the line below the names;
-    lines above it are comments.
+    The heading names every column as `NAME (UNIT)` or `NAME / UNIT`, or the units stand in the
+    line below the names; lines above it are comments.
 
     Raises:
         UserError: no such file or column, no unit or a wrong one, too few lines, or a line without
@@ -112,7 +118,7 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
     cells = cells._replace(rows=_with_units_below(cells.rows))
     heading, named = _heading(cells.rows, list(wanted), path)
     titles = {name: cells.rows[heading - 1][named[name]] for name in wanted}
-    factors = [_factor(titles[name], wanted[name], name, path) for name in wanted]
+    factors = [_factor(_unit(titles[name]), wanted[name], name, path) for name in wanted]
     lines = [(number, row) for number, row in enumerate(cells.rows, 1) if any(row)]
     lines = [(number, row) for number, row in lines if number > heading]
     if len(lines) < least:
@@ -165,14 +171,34 @@ def _heading(
     raise UserError("columns are missing", file=path, value=list(wanted), remedy=remedy)
 
 
-def _factor(title: str, dimension: units.Dimension, name: str, path: Path) -> float:
-    """Reads the unit in a column's title: so many working units are one of it."""
-    remedy = f"write the heading as {name} ({dimension.unit}), with the unit of the numbers"
+def _unit(title: str) -> str | None:
+    """Reads the unit that stands in brackets, or behind a stroke, in a column's title."""
     match = _HEADING.fullmatch(title)
-    if match is None:
+    return match and match["unit"]
+
+
+def _told_unit(title: str, dimension: units.Dimension) -> str | None:
+    """Reads the unit in a title; the last word is one if it fits there or can be nothing else."""
+    if (unit := _unit(title)) is not None:
+        return unit
+    match = _ENDING.fullmatch(title)
+    return match["unit"] if match and _is_unit(match["unit"], dimension) else None
+
+
+def _is_unit(word: str, dimension: units.Dimension) -> bool:
+    try:
+        units.parse_quantity(f"1 {word}", dimension)
+    except UserError:
+        return _FOREIGN.fullmatch(word) is not None
+    return True
+
+
+def _factor(unit: str | None, dimension: units.Dimension, name: str, path: Path) -> float:
+    """Computes how many working units a column's unit is."""
+    remedy = f"write the heading as {name} ({dimension.unit}), with the unit of the numbers"
+    if unit is None:
         raise UserError("the unit of the column is missing", file=path, key=name, remedy=remedy)
     try:
-        return units.parse_quantity(f"1 {match['unit']}", dimension)
+        return units.parse_quantity(f"1 {unit}", dimension)
     except UserError as error:
-        value = match["unit"]
-        raise UserError(error.what, file=path, key=name, value=value, remedy=remedy) from error
+        raise UserError(error.what, file=path, key=name, value=unit, remedy=remedy) from error

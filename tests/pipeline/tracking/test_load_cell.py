@@ -1,6 +1,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from pipeline.tracking.frames import load_cell
 from pipeline.tracking.frames.recording import LoadCellLog
@@ -51,3 +52,33 @@ def test_units_of_a_log_are_those_of_its_heading(tmp_path: Path) -> None:
         np.testing.assert_allclose(found.force, plain.force)
     with refused("is not that of a force", "Load"):
         load_cell.read(log(tmp_path, "Time (s),Load (mm)\n0.1,20\n"), cell)
+
+
+@cases("tracking", "time, force")
+def test_units_behind_a_name_are_read_as_those_in_brackets(
+    tmp_path: Path, time: str, force: str
+) -> None:
+    path = log(tmp_path, f"{time};{force}\n100;0,02\n200;0,04\n")
+    found = load_cell.read(path, LoadCellLog(file="load.csv", time=time, force=force))
+    np.testing.assert_allclose(found.clock, [0.1, 0.2])
+    np.testing.assert_allclose(found.force, [20.0, 40.0])
+
+
+@cases("tracking", "force, told")
+def test_a_unit_that_is_none_of_a_force_is_refused(tmp_path: Path, force: str, told: str) -> None:
+    path = log(tmp_path, f"time;{force}\n0;2\n1;4\n")
+    with refused(told, force, f"{force} (N)", path):
+        load_cell.read(path, LoadCellLog(file="load.csv", force=force))
+
+
+@pytest.mark.parametrize("force", ["force_left", "Load cell", "force_min", "Kraft F", "F_t"])
+def test_the_end_of_a_name_is_no_unit_unless_it_is_known(tmp_path: Path, force: str) -> None:
+    path = log(tmp_path, f"time_s;{force}\n0;2\n1;4\n")
+    found = load_cell.read(path, LoadCellLog(file="load.csv", time="time_s", force=force))
+    np.testing.assert_array_equal(found.force, [2.0, 4.0])
+
+
+def test_a_name_before_a_stroke_names_the_column(tmp_path: Path) -> None:
+    path = log(tmp_path, "Time / ms;Load / kN\n100;0,02\n200;0,04\n")
+    found = load_cell.read(path, LoadCellLog(file="load.csv", time="Time", force="Load"))
+    np.testing.assert_allclose(found.force, [20.0, 40.0])
