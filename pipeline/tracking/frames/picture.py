@@ -15,14 +15,24 @@ WHITE = 255.0
 _FULL = (1023.0, 4095.0, 16383.0, 65535.0)
 """Greatest levels of cameras of 10 to 16 bit, whose pictures hold them in 16 bit as they are."""
 
+_AS_THEY_ARE = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH
+
 
 def read_levels(path: Path) -> np.ndarray | None:
     """Reads the grey levels (rows, columns) that a picture's file holds; None if it cannot."""
     try:
-        levels = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
+        levels = cv2.imread(str(path), _AS_THEY_ARE)
     except cv2.error:  # too many pixels, among others
         return None
     return None if levels is None else np.asarray(levels)
+
+
+def page_count(path: Path) -> int:
+    """Counts the pictures in a TIFF that can be read; previews of another size are none."""
+    if (count := cv2.imcount(str(path), _AS_THEY_ARE)) < 2:
+        return 1
+    pages = cv2.imreadmulti(str(path), 0, 2, flags=_AS_THEY_ARE)[1]
+    return count if len({page.shape for page in pages}) == 1 else 1
 
 
 def full_scale(pictures: Sequence[np.ndarray]) -> float:

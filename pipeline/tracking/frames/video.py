@@ -14,7 +14,7 @@ import av
 import numpy as np
 
 from pipeline.runtime import Picture, UserError
-from pipeline.tracking.frames.picture import WHITE, brightness, full_scale, read_levels
+from pipeline.tracking.frames.picture import WHITE, brightness, full_scale, page_count, read_levels
 from sim.core import Floats
 
 SYNTHETIC_LABEL = "SYNTHETIC"
@@ -32,7 +32,8 @@ _ALONE = {
 }
 """Kinds of files that hold what they show: playlists name others, and may wait for more."""
 
-_SUFFIXES = {".png", ".tif", ".tiff"}
+_PAGED = {".tif", ".tiff"}
+_SUFFIXES = {".png", *_PAGED}
 _DEEP_WHITE = 65535.0
 """White of the frames that FFmpeg gives in 16 bit, however many the file has."""
 _LUMA = np.array([0.299, 0.587, 0.114])
@@ -377,7 +378,7 @@ def images(folder: Path) -> Iterator[Picture]:
     The first, the last and the one between tell how many levels the camera has.
 
     Raises:
-        UserError: one cannot be read.
+        UserError: one cannot be read, or holds several.
     """
     found = pictures(folder)
     some = (read_levels(found[place]) for place in (0, len(found) // 2, -1))
@@ -385,6 +386,10 @@ def images(folder: Path) -> Iterator[Picture]:
     for path in found:
         if (levels := read_levels(path)) is None:
             raise UserError("not a readable picture", file=path, remedy="write the file again")
+        if path.suffix.lower() in _PAGED and (count := page_count(path)) > 1:
+            what = f"there are {count} pictures in one file"
+            remedy = f"write each to a file, e.g. magick {path.name} {path.stem}_%05d.tif"
+            raise UserError(what, file=path, key="video", remedy=remedy)
         yield brightness(levels, top)
 
 

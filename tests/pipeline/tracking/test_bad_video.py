@@ -105,6 +105,16 @@ def test_faulty_folders_of_pictures_are_told(tmp_path: Path, clip: list[np.ndarr
         list(read_frames(tmp_path, rate=1.0))
 
 
+def test_a_file_of_many_pictures_is_refused(tmp_path: Path, clip: list[np.ndarray]) -> None:
+    """But not one with a preview behind the picture."""
+    path = tmp_path / "a1.tif"
+    assert cv2.imwritemulti(str(path), [clip[0], clip[0][::8, ::8].copy()])
+    np.testing.assert_array_equal(next(read_frames(tmp_path, rate=1.0)).image, clip[0])
+    assert cv2.imwritemulti(str(path), clip)
+    with refused(f"{len(clip)} pictures in one file", "video", "magick a1.tif", path):
+        next(read_frames(tmp_path, rate=1.0))
+
+
 def test_a_phone_s_video_is_shown_upright(tmp_path: Path) -> None:
     """The header of the track tells by how much players are to turn it."""
     held = bytearray((CLIPS / "f_silhouette.mp4").read_bytes())
