@@ -62,12 +62,18 @@ def find_lag(measured: SampledMotion, nominal: SampledMotion) -> Lag:
     """Finds the lag at which the courses agree best, up to a gain and an offset.
 
     Raises:
-        UserError: too few frames, or the courses agree at no lag.
+        UserError: too few frames, frames without times, or the courses agree at no lag.
     """
     seen = np.isfinite(measured.value).all(axis=1)
     held = SampledMotion(measured.time[seen], measured.value[seen])
     if len(held.time) < LEAST_FRAMES:
         raise too_few_frames(len(held.time))
+    if np.median(np.diff(held.time)) <= 0:
+        raise UserError(
+            "most frames of the track have the time of the one before",
+            key="frame_rate",
+            remedy="give the recording the rate at which they were taken, and track it again",
+        )
     tried = _lags(held, nominal)
     found = np.array([_correlation(held, nominal, lag) for lag in tried])
     place, ambiguous = _best(tried, found)

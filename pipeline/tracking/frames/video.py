@@ -45,6 +45,8 @@ _LARGEST = 1 << 27
 
 _AHEAD = 2
 """Frames that are decoded while one is looked at."""
+_BEGINNING = 8
+"""Frames whose stamps show whether they are too coarse for the rate."""
 _ALL = 0.95
 """A video with less of the frames than this that its file promises breaks off."""
 
@@ -101,7 +103,7 @@ def read_frames(
 
 
 def _untimed(path: Path, what: str) -> UserError:
-    remedy = "add how many were taken in a second, such as frame_rate: '30 Hz'"
+    remedy = "add how many were taken in a second, such as frame_rate: '300 Hz'"
     return UserError(what, file=path, key="frame_rate", remedy=remedy)
 
 
@@ -230,16 +232,30 @@ def _video_stream(container: av.container.InputContainer, path: Path) -> av.Vide
 class _Clock:
     """Tells times since the first frame, s: by the rate that is given, else by the stamps."""
 
-    def __init__(self, stream: av.VideoStream, rate: float | None) -> None:
-        self._usual, self._rate = float(stream.average_rate or 1), rate
+    def __init__(self, path: Path, stream: av.VideoStream, rate: float | None) -> None:
+        self._path, self._usual, self._rate = path, float(stream.average_rate or 1), rate
         self._first: float | None = None
+        self._instants: set[float] = set()
         self.lasted = 0.0  # by the stamps
 
     def __call__(self, index: int, frame: av.VideoFrame) -> float:
+        """Reads the time of a frame; refuses a file whose stamps tell none apart.
+
+        Raises:
+            UserError: no rate is given, and there are no stamps, or too coarse ones.
+        """
+        if index == 0 and self._rate is None and frame.pts is None:
+            raise _untimed(self._path, "the file holds no times of its frames")
         stamp = index / self._usual if frame.pts is None else float(frame.time)
         self._first = stamp if self._first is None else self._first
         self.lasted = stamp - self._first
-        return self.lasted if self._rate is None else index / self._rate
+        if self._rate is not None:
+            return index / self._rate
+        if index < _BEGINNING:
+            self._instants.add(stamp)
+        if index == _BEGINNING - 1 and len(self._instants) <= _BEGINNING // 2:
+            raise _untimed(self._path, "most frames have the time of the one before")
+        return self.lasted
 
 
 def _decoded(
@@ -250,7 +266,7 @@ def _decoded(
     rate: float | None,
 ) -> Iterator[Frame]:
     index, time, (start, end) = 0, 0.0, window
-    decoded, shades, clock = iter(container.decode(stream)), _Shades(), _Clock(stream, rate)
+    decoded, shades, clock = iter(container.decode(stream)), _Shades(), _Clock(path, stream, rate)
     while time < end:
         try:
             frame = next(decoded, None)
@@ -262,8 +278,6 @@ def _decoded(
             if _goes_on(container, stream, index, clock.lasted):
                 raise broken_off(path, "the file should go on", index, time)
             return
-        if index == 0 and rate is None and frame.pts is None:
-            raise _untimed(path, "the file holds no times of its frames")
         time = clock(index, frame)
         if time > end:
             return

@@ -42,7 +42,7 @@ def timing_faults(time: Floats, motion: Reals, sigma: Reals, same: Mask) -> Ints
 
     A frame that repeats the one before is the same in its pixels. A gap stands in the stamps, or
     else the motion goes on smoothly after it, but only if the frames from there on are later than
-    they say. Where the specimen is at rest or jolts, the stamps alone tell.
+    they say. Where the specimen is at rest or jolts, the stamps alone tell, unless most are alike.
 
     Args:
         time: (frames,) s, as the file says.
@@ -56,7 +56,7 @@ def timing_faults(time: Floats, motion: Reals, sigma: Reals, same: Mask) -> Ints
     )
     repeated = _repeated(same)
     out = np.where(repeated, DUPLICATE, STEADY)
-    if len(time) > 1:
+    if len(time) > 1 and np.median(np.diff(time)) > 0:
         steps = np.diff(time, prepend=2 * time[0] - time[1]) / np.median(np.diff(time))
         gap = steps > _GAP
         if gap.mean() < _SELDOM:

@@ -113,7 +113,8 @@ def _courses(
         axes.legend(loc="best")
     else:
         axes.text(0.5, 0.5, "none", transform=axes.transAxes, ha="center")
-    span = (np.nanmin(load), np.nanmax(load)) if len(load) > 1 else None
+    first, last = np.nanmin(load), np.nanmax(load)
+    span = (first, last) if first < last else None
     axes.set(xlabel=label, ylabel="of the units, %", xlim=span, ylim=(0, None))
     style.letter(drawn, 92.0, 66.0, "e", "Uncertainty of the place: median, 90 % of the units")
     axes = style.place(drawn, 104.0, 73.0, 70.0, 47.0)

@@ -68,7 +68,7 @@ def measured(track: xr.Dataset, images: Iterable[Image], stream: StreamPropertie
     scale = np.array([1 / pixel, 1 / pixel, 180 / np.pi])
     resting = _resting(pose, sigma)
     timing = track["timing"].values
-    interval = np.diff(track["time"].values)
+    interval, rate = np.diff(track["time"].values), frame_rate(track)
     steps = np.linalg.norm(np.diff(pose[..., :2], axis=0), axis=-1) / pixel
     there = np.isin(track["unit"].values, specimen.ids)
     quality = track["quality"].values[:, there]
@@ -86,11 +86,18 @@ def measured(track: xr.Dataset, images: Iterable[Image], stream: StreamPropertie
         track["frame"].values[timing == TIMING["duplicate"]].tolist(),
         track["frame"].values[timing == TIMING["dropped"]].tolist(),
         float(np.nanmax(steps, initial=0.0)),
-        float(np.ptp(interval) / np.median(interval)) if len(interval) else 0.0,
+        float(np.ptp(interval) * rate) if rate else 0.0,
         float(np.sqrt(np.nanmean(residual**2))),
         _light(images),
         stream,
     )
+
+
+def frame_rate(track: xr.Dataset) -> float:
+    """Computes the usual number of frames in a second; zero where times do not tell."""
+    interval = np.diff(track["time"].values)
+    usual = float(np.median(interval)) if len(interval) else 0.0
+    return 1 / usual if usual > 0 else 0.0
 
 
 def pixel_size(track: xr.Dataset) -> float:

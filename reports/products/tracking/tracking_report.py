@@ -21,6 +21,9 @@ from reports.products.tracking import advice, figure, overlay, track_quality
 from reports.products.tracking.track_quality import TrackQuality
 from sim.core import Image
 
+_SHOWN = 30.0
+"""Frames per second of an overlay whose own rate is not known."""
+
 
 def report(args: argparse.Namespace) -> None:
     """Makes the report that a command line asks for."""
@@ -40,7 +43,7 @@ def report(args: argparse.Namespace) -> None:
 
         painted = overlay.painter(track, args.colour)
         labels = {"title": asked.title or args.video.stem, "comment": painted.note}
-        rate = 1 / float(np.median(np.diff(track["time"].values)))
+        rate = track_quality.frame_rate(track) or _SHOWN
         codec = Codec(crf=20)
         encode_video(
             args.out_dir / "overlay.mp4", overlay.images(painted, shown()), rate, codec, labels
@@ -86,8 +89,9 @@ def _lines(track: xr.Dataset, found: TrackQuality) -> Iterator[tuple[str, str, s
     """Yields what a line of the table is of, its value, and a note."""
     time = track["time"].values
     width, height = track["image_size"].values
-    rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else float("nan")
-    yield "Frames", f"{len(time)}", f"{rate:.4g} per second, {width} × {height} px"
+    lasted = float(np.ptp(time))
+    rate = f"{(len(time) - 1) / lasted:.4g} per second" if lasted > 0 else "rate not known"
+    yield "Frames", f"{len(time)}", f"{rate}, {width} × {height} px"
     yield "Scale", f"{found.pixel:.4g} mm/px", f"{found.pitch:.3g} px from unit to unit"
     yield "Blur at edges", f"{found.blur:.2f} px", "standard deviation"
     yield "Stated uncertainty", *_accuracy(found.sigma, found.pixel)

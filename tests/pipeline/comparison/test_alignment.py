@@ -92,6 +92,8 @@ def test_other_frequencies_and_too_few_frames_are_refused() -> None:
         find_lag(filmed(0.0, frames=7), NOMINAL)
     with pytest.raises(UserError, match="too few frames"):
         find_load_time(np.full(20, np.nan), SampledMotion(TIMES, TIMES[:, None]))
+    with refused("have the time of the one before", "frame_rate"):
+        find_lag(SampledMotion(np.floor(RATE * time / 5) / RATE, sine(time)), NOMINAL)
 
 
 def test_equal_displacement_is_equal_load_on_both_branches() -> None:

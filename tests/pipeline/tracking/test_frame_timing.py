@@ -125,6 +125,12 @@ def test_stamps_that_count_milliseconds_are_evened(rate: float) -> None:
     assert (frame_timing.unrounded(varying) == varying).all()
 
 
+def test_stamps_of_no_steps_tell_no_fault() -> None:
+    coarse = np.floor(np.arange(FRAMES) / 5) / 1000
+    with np.errstate(all="raise"):
+        assert faults(motion(np.arange(FRAMES)), coarse) == {}
+
+
 def test_stated_uncertainty_is_that_of_the_noise() -> None:
     moved, steady = motion(np.arange(FRAMES, dtype=float)), np.ones(FRAMES, dtype=bool)
     seen_badly = moved.copy()

@@ -100,7 +100,7 @@ def test_the_rate_that_is_given_is_that_of_the_camera(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("name", "codec"), [("a.h264", "libx264"), ("a.hevc", "libx265")])
 def test_a_bare_stream_has_no_times_but_by_a_rate(tmp_path: Path, name: str, codec: str) -> None:
     path = written(tmp_path / name, list(range(8)), codec)
-    with refused("no times", "frame_rate", "frame_rate: '30 Hz'", path):
+    with refused("no times", "frame_rate", "frame_rate: '300 Hz'", path):
         list(read_frames(path))
     shown = list(read_frames(path, rate=30.0))
     np.testing.assert_allclose([frame.time for frame in shown], np.arange(8) / 30)
@@ -112,3 +112,13 @@ def test_an_interlaced_video_is_refused(tmp_path: Path, codec: str) -> None:
     path = written(tmp_path / "a.mkv", list(range(4)), codec, flags="+ildct+ilme")
     with refused("interlaced", "video", "ffmpeg -i a.mkv -vf bwdif", path):
         list(read_frames(path))
+
+
+def test_stamps_too_coarse_for_the_rate_are_refused(tmp_path: Path) -> None:
+    """Of several frames in a millisecond, which is what a Matroska counts."""
+    path = written(tmp_path / "a.mkv", list(range(40)), "ffv1", 5000)
+    with refused("most frames have the time of the one before", "frame_rate", "'300 Hz'", path):
+        list(read_frames(path))
+    shown = list(read_frames(path, rate=5000.0))
+    np.testing.assert_allclose([frame.time for frame in shown], np.arange(40) / 5000)
+    assert len(list(read_frames(written(tmp_path / "b.mkv", list(range(40)), "ffv1", 900)))) == 40

@@ -163,19 +163,39 @@ def _about(place: np.ndarray) -> tuple[slice, slice]:
     return slice(row - 12, row + 12), slice(column - 12, column + 12)
 
 
-def test_the_page_says_synthetic_and_is_the_same_twice(track: xr.Dataset, tmp_path: Path) -> None:
-    with av.open(str(tmp_path / "v.mkv"), "w") as container:
+def filmed(track: xr.Dataset, folder: Path) -> list[str]:
+    """Writes a track and its video, and returns the options that name them."""
+    with av.open(str(folder / "v.mkv"), "w") as container:
         stream = container.add_stream("ffv1", rate=10)
         stream.width = stream.height = 176
         stream.pix_fmt = "gray"
-        for _ in range(FRAMES):
+        for _ in range(track.sizes["time"]):
             container.mux(stream.encode(av.VideoFrame.from_ndarray(grey(), format="gray")))
         container.mux(stream.encode(None))
-    origin = {"parents": json.dumps({"video": provenance.file_hash(tmp_path / "v.mkv")})}
-    datasets.write(track, tmp_path / "track.nc", "track", origin)
-    made = []
+    origin = {"parents": json.dumps({"video": provenance.file_hash(folder / "v.mkv")})}
+    datasets.write(track, folder / "track.nc", "track", origin)
+    return ["--track", str(folder / "track.nc"), "--video", str(folder / "v.mkv")]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("frames", [1, 6])
+def test_a_page_of_frames_without_intervals_is_made(
+    track: xr.Dataset, tmp_path: Path, frames: int
+) -> None:
+    """Of one frame, or of several that have one time."""
+    short = track.isel(time=slice(frames))
+    words = filmed(short.assign_coords(time=np.zeros(frames)), tmp_path)
+    assert main(["tracking", *words, "--out-dir", str(tmp_path / "page"), "--quiet"]) == 0
+    page = (tmp_path / "page/index.html").read_text(encoding="utf-8")
+    assert "rate not known, 176 × 176 px" in page
+    assert "nan" not in page.split("<svg")[0]
+    with av.open(str(tmp_path / "page/overlay.mp4")) as shown:
+        assert sum(1 for _ in shown.decode(video=0)) == frames
+
+
+def test_the_page_says_synthetic_and_is_the_same_twice(track: xr.Dataset, tmp_path: Path) -> None:
+    words, made = filmed(track, tmp_path), []
     for name in ("first", "second"):
-        words = ["--track", str(tmp_path / "track.nc"), "--video", str(tmp_path / "v.mkv")]
         assert main(["tracking", *words, "--out-dir", str(tmp_path / name), "--quiet"]) == 0
         folder = tmp_path / name
         made.append([(folder / file).read_bytes() for file in ("index.html", "overlay.mp4")])
