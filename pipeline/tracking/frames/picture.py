@@ -14,6 +14,8 @@ WHITE = 255.0
 
 _FULL = (1023.0, 4095.0, 16383.0, 65535.0)
 """Greatest levels of cameras of 10 to 16 bit, whose pictures hold them in 16 bit as they are."""
+_SPILT = 2.0
+"""Greatest level where white is one: what sharpens or resamples pictures goes a little beyond."""
 
 _AS_THEY_ARE = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH
 
@@ -39,25 +41,27 @@ def full_scale(pictures: Sequence[np.ndarray]) -> float:
     """Finds the level of white of the camera that took the pictures; see ``brightness``.
 
     One of 16 bit that used less than a quarter of its range is told as one of less, whose white
-    its brightest pixel does not reach either.
+    its brightest pixel does not reach either. So is one of signed or real numbers, whose white
+    may be one; beyond 16 bit, the brightest pixel is white.
     """
     kinds = {levels.dtype for levels in pictures}
     if kinds <= {np.dtype(np.uint8)}:
         return WHITE
-    if not all(kind.kind == "u" for kind in kinds):
-        return 1.0
-    most = max(int(levels.max(initial=0)) for levels in pictures)
-    return next(top for top in _FULL if top >= most)
+    most = max(float(levels[np.isfinite(levels)].max(initial=0)) for levels in pictures)
+    if all(kind.kind == "u" for kind in kinds):
+        return next(top for top in _FULL if top >= most)
+    return 1.0 if most < _SPILT else next((top for top in (WHITE, *_FULL) if top >= most), most)
 
 
 def brightness(levels: np.ndarray, top: float) -> Picture:
     """Computes brightness from 0 to 255, (rows, columns): 8 bit as they are, more as fractions.
 
-    `top` is the level of white; what is brighter counts as white.
+    `top` is the level of white; what is brighter counts as white, what is no number as black.
     """
     if levels.dtype == np.uint8:
         return levels
-    return np.asarray(np.minimum(levels * (WHITE / top), WHITE), np.float32)
+    known = levels if levels.dtype.kind == "u" else np.nan_to_num(levels, posinf=top)
+    return np.asarray(np.clip(known * (WHITE / top), 0.0, WHITE), np.float32)
 
 
 def read_pictures(*paths: Path) -> list[Image]:

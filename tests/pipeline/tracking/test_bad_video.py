@@ -89,6 +89,22 @@ def test_pictures_keep_the_levels_of_their_camera(
     assert np.abs(full.astype(float) - clip[1]).max() <= 1.0
 
 
+@pytest.mark.parametrize("white", [1.0, 1.1, 255.0, 4095.0, 65535.0, 2e5])
+def test_pictures_of_real_numbers_keep_their_levels(
+    tmp_path: Path, clip: list[np.ndarray], white: float
+) -> None:
+    """Of whatever range, as programs for images write them; what is no number counts as black."""
+    real = [image * np.float32(white / 255.0) for image in clip]
+    real[-1][0, :3] = np.nan, -5.0, np.inf
+    for number, levels in enumerate(real):
+        assert cv2.imwrite(str(tmp_path / f"frame{number}.tif"), levels)
+    read = [frame.image for frame in read_frames(tmp_path, rate=50.0)]
+    brightest = max(image.max() for image in clip)
+    gain = {1.1: 1.1, 2e5: 255.0 / brightest}.get(white, 1.0)
+    np.testing.assert_allclose(read[1], np.minimum(gain * clip[1], 255.0), atol=0.1)
+    np.testing.assert_array_equal(read[-1][0, :3], [0.0, 0.0, 255.0])
+
+
 def test_faulty_folders_of_pictures_are_told(tmp_path: Path, clip: list[np.ndarray]) -> None:
     with pytest.raises(UserError, match="no pictures"):
         list(read_frames(tmp_path, rate=1.0))
