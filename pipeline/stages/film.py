@@ -107,7 +107,7 @@ def _weigh(path: Path, response: Path, out: Path) -> None:
         lines = load_cell_log(_shown(asked, response), virtual, virtual.load_cell)
     with write_atomically(out) as aside, aside.open("w", encoding="utf-8") as file:
         file.write(f"# {SYNTHETIC}\ntime,force\n")
-        file.writelines(f"{time:.4f},{force:.5f}\n" for time, force in lines)
+        file.writelines(f"{time:.12g},{force:.5f}\n" for time, force in lines)
 
 
 def _virtual(path: Path) -> tuple[Recording, VirtualRecording]:

@@ -8,6 +8,8 @@ import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
+from pipeline.tracking.frames import load_cell
+from pipeline.tracking.frames.recording import LoadCellLog
 from pipeline.virtual_lab.filming import VirtualFilm
 from tests.pipeline.conftest import Failing
 from tests.pipeline.virtual_lab.conftest import SETUP
@@ -55,6 +57,15 @@ def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> No
     with av.open(str(out)) as video:
         assert "SYNTHETIC" in video.metadata["comment"]
         assert float(video.streams.video[0].average_rate or 0) == 20.0
+
+
+def test_a_log_of_many_lines_in_a_millisecond_can_be_read(files: Path, tmp_path: Path) -> None:
+    asked = recording(tmp_path, load_cell={"rate": "24 kHz"})
+    out = tmp_path / "load.csv"
+    words = ["weigh", str(asked), "--response", str(files / "response.nc"), "--out", str(out)]
+    assert run_stage("film", words) == 0
+    clock = load_cell.read(out, LoadCellLog(file="load.csv")).clock
+    np.testing.assert_allclose(clock, np.arange(len(clock)) / 24_000, rtol=1e-9)
 
 
 def test_a_request_is_not_written_over(files: Path, tmp_path: Path, failing: Failing) -> None:
