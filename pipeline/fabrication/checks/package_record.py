@@ -25,6 +25,8 @@ class ExpectedParts:
 
     polygons: dict[str, Polygon]  # outline as designed, in the specimen frame
     joints: tuple[tuple[tuple[str, int], tuple[str, int]], ...]  # (label, vertex) of both ends
+    clamped: tuple[str, ...] = ()  # labels
+    driven: tuple[str, ...] = ()  # likewise
 
     @cached_property
     def slots(self) -> dict[str, list[int]]:
@@ -40,7 +42,9 @@ def expected_parts(design: xr.Dataset, structure: str) -> ExpectedParts:
     net = network(design, structure)
     polygons = {net.labels[number]: net.polygons[number] for number in net.numbers}
     joints = ((net.labels[a], p, net.labels[b], q) for _, (a, p), (b, q), _ in net.ligaments)
-    return ExpectedParts(polygons, tuple(((one, p), (other, q)) for one, p, other, q in joints))
+    ends = tuple(((one, p), (other, q)) for one, p, other, q in joints)
+    clamped, driven = (tuple(net.labels[n] for n in held) for held in (net.clamped, net.driven))
+    return ExpectedParts(polygons, ends, clamped, driven)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from shapely import Geometry
+from shapely import Geometry, Polygon, affinity
 
 from pipeline.fabrication.checks.assembled_specimen import check_outline
 from pipeline.fabrication.checks.package_record import PackageRecord
@@ -26,6 +26,9 @@ from pipeline.problem.sections import Fabrication, Print
 _NEAR = 5e-3  # mm between the same vertex of two files
 _FOOTPRINT = np.array([0.02, 0.5, 0.98])  # shares of its height where a part's footprint is taken
 _LEAST_SUNK = 0.1  # mm^2 of an id
+_LEAST_HELD = 0.08  # share of a unit that its holder covers
+_ROUND = 0.05  # by which the area of a polygon may be less than that of its circle, as a share
+_LID = "-LID"  # ends the names of what is bolted on top
 
 
 def check_print(record: PackageRecord) -> Iterator[Fault]:
@@ -46,16 +49,59 @@ def check_print(record: PackageRecord) -> Iterator[Fault]:
 
 
 def check_fixtures(record: PackageRecord) -> Iterator[Fault]:
-    """Checks clamps, adapter and jig: solids, each on one plate as in its own file."""
+    """Checks clamps, adapters and jig: solids, each on one plate as in its own file; their hold."""
     folder = record.folder / "fixture"
     parts = {path.stem: read_stl(path) for path in sorted(folder.glob("*.stl"))}
-    for solid in parts.values():
-        yield from check_solid(solid)
+    broken = [fault for solid in parts.values() for fault in check_solid(solid)]
+    yield from broken
+    if not broken:
+        yield from _check_holders(parts, record)
     names, faults = _plate_faults(folder.glob("*.3mf"), parts, record.settings)
     yield from faults
     if sorted(names) != sorted(parts):
         what = "the plates do not hold each of the fixture's parts once"
         yield Fault("the fixture", what, "fixture", BUG, folder)
+
+
+def _check_holders(parts: Mapping[str, MeshBody], record: PackageRecord) -> Iterator[Fault]:
+    """Checks what holds units: part of each is on its holder, which has a hole for a bolt."""
+    expected, hole = record.expected, record.settings.fixture.hole
+    lids = {f"{name}{_LID}" for name in parts}
+    for kind, labels in (("CLAMP", expected.clamped), ("DRIVE", expected.driven)):
+        names = [name for name in parts if name.startswith(kind) and name not in lids]
+        bases = {name: _base(name, parts, record.settings) for name in names}
+        units = {label: expected.polygons[label] for label in labels if label in expected.polygons}
+        on = {
+            (u, n): _is_on(shape, base) for u, shape in units.items() for n, base in bases.items()
+        }
+        for label, shape in units.items():
+            if not any(on[label, name] for name in names):
+                what, folder = "no part of the fixture holds it", record.folder / "fixture"
+                yield Fault(f"unit {label}", what, "fixture", BUG, folder, (shape,), shape)
+        for name, base in bases.items():
+            if not any(on[label, name] for label in units):
+                yield parts[name].fault("it holds none of the units that it is for", "fixture")
+            if not _is_bolted(base, hole):
+                yield parts[name].fault(f"it has no hole of {hole:g} mm for a bolt", "fixture.hole")
+
+
+def _base(name: str, parts: Mapping[str, MeshBody], settings: Fabrication) -> Geometry:
+    """Cuts a holder above its id, as it is used: an adapter, without a lid, lies on its back."""
+    area = parts[name].section((settings.labels.depth + settings.fixture.base) / 2)
+    if f"{name}{_LID}" in parts:
+        return area
+    return affinity.scale(area, xfact=-1.0, origin=(0.0, 0.0))
+
+
+def _is_on(unit: Polygon, base: Geometry) -> bool:
+    return bool(base.intersection(unit).area > _LEAST_HELD * unit.area)
+
+
+def _is_bolted(base: Geometry, hole: float) -> bool:
+    """Tests that a base has a round hole of this diameter, mm."""
+    rings = (ring for part in shapely.get_parts(base) for ring in part.interiors)
+    areas = [Polygon(ring).area for ring in rings]
+    return bool(np.isclose(areas, np.pi / 4 * hole**2, rtol=_ROUND).any())
 
 
 def _check_unit(label: str, solid: MeshBody, record: PackageRecord) -> Iterator[Fault]:

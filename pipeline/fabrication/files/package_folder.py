@@ -85,7 +85,8 @@ class PackageFolder:
         settings, spacing = self.problem.fabrication, self.problem.lattice.spacing
         solids = list(fixtures(self.specimen, settings, spacing))
         for solid in solids:
-            write_stl([solid.mesh], self._path(f"fixture/{solid.id}.stl"))
+            placed = solid.mesh.moved(*solid.bounds[:2])
+            write_stl([placed], self._path(f"fixture/{solid.id}.stl"))
         self._write_plates("fixture/fixture", solids)
 
     def _write_plates(self, kind: str, solids: Sequence[PrintedPart]) -> None:

@@ -205,7 +205,7 @@ def assembly_steps(
     ]
     if specimen.clamped:
         clamped = ", ".join(specimen.clamped)
-        steps.append(f"Set the clamped units into their pads or grips: {clamped}.")
+        steps.append(f"Set the clamped units into their pads, grips or adapters: {clamped}.")
     if specimen.driven:
         driven = ", ".join(specimen.driven)
         room = "Where neighbours leave an adapter no room for fingers, glue it on."

@@ -45,7 +45,7 @@ def test_the_pages_name_every_unit_shim_and_fixture(tmp_path: Path) -> None:
     (shims,) = (page for page in pages if "shims" in page[0])
     assert "shims: 8 pieces of 1 lengths" in shims[0]
     assert {"S8.25", "8.25 mm", "8.10 mm", "7", "1", "8"} <= set(shims)
-    assert "Set the clamped units into their pads or grips: A1, C2." in " ".join(pages[0])
+    assert "Set the clamped units into their pads, grips or adapters: A1, C2." in " ".join(pages[0])
     steps = [words for words in pages[0] if words.rstrip(".").isdigit()]
     assert steps[1:] == [f"{number}." for number in range(1, 13)]  # after the page's own
 

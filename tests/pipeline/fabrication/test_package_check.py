@@ -120,6 +120,16 @@ def halved(name: str, kept: float = 0.5) -> Callable[[Path], None]:
     return damage
 
 
+def moved(name: str, x: float) -> Callable[[Path], None]:
+    """The triangles of an STL file, farther to the right."""
+
+    def damage(package: Path) -> None:
+        body = read_stl(package / name)
+        write_stl(package / name, np.add(body.vertices, [x, 0.0, 0.0]), body.triangles)
+
+    return damage
+
+
 def scaled(name: str, factor: float) -> Callable[[Path], None]:
     """The triangles of an STL file, larger or smaller."""
 
@@ -142,6 +152,11 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "3mf cut short": (halved("print/units_plate1.3mf"), "cannot be read back"),
     "bill": (edited("bom.csv", "unit,B2,1", "unit,B2,2"), "unit B2: it is there 2 times"),
     "another shim": (edited("bom.csv", "8.2500,8.1000", "8.2700,8.1000"), "it is not 8.27 x 8.10"),
+    "clamp aside": (moved("fixture/CLAMP-A1.stl", 60.0), "unit A1: no part of the fixture holds"),
+    "clamp without a bolt": (
+        copied("fixture/JIG1.stl", "fixture/CLAMP-A1.stl"),
+        "part CLAMP-A1: it has no hole of 4.2 mm for a bolt",
+    ),
     "another letter": (
         edited(MANIFEST, '"letters_for_ids": {}', '"letters_for_ids": {"A1": "Q"}'),
         "unit A1: it is not on the assembly sheet",

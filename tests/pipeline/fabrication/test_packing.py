@@ -59,7 +59,7 @@ def test_an_adapter_holds_its_unit_and_touches_no_other() -> None:
     """Seen as it is used: it is printed on its back."""
     one = handmade.specimen()
     unit = one.units[1]
-    fingers = adapter(unit, one, handmade.ASKED).layers[-1].area
+    fingers = adapter("DRIVE", unit, one, handmade.ASKED).layers[-1].area
     placed = affinity.scale(fingers, xfact=-1.0, origin=(0.0, 0.0))
     assert placed.area > 20.0
     others = [other.outline for other in one.units if other is not unit]
@@ -68,12 +68,12 @@ def test_an_adapter_holds_its_unit_and_touches_no_other() -> None:
 
 
 def test_bolts_of_a_grip_in_pieces_keep_off_their_ends() -> None:
-    """Four in a row 10 mm apart; the middle piece, of 15 mm, has room for the heads of none."""
+    """Four in a row 10 mm apart; the middle piece, of 15 mm, has one of its own in its middle."""
     held = replace(handmade.specimen(), clamped=("A1", "B1", "C1"))
     given = {"print": {"bed": ["30 mm", "99 mm"]}, "fixture": {"bolt_pitch": "10 mm"}}
     asked = Fabrication.model_validate(given, context=SIM_UNITS)
     made = (part for part in fixtures(held, asked, handmade.SPACING) if "LID" in part.id)
-    assert [len(lid.layers[0].area.interiors) for lid in made] == [1, 0, 1]
+    assert [len(lid.layers[0].area.interiors) for lid in made] == [1, 1, 1]
 
 
 def test_infill_saves_what_is_far_from_top_and_bottom() -> None:

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from shapely import affinity
 
 from pipeline import datasets, problem
 from pipeline.fabrication.fixtures import fixtures
-from pipeline.fabrication.fixtures.specimen_holders import held_edges
+from pipeline.fabrication.fixtures.holder_bases import held_edges
 from pipeline.fabrication.parts import BuiltSpecimen
 from pipeline.fabrication.units import build_specimen, network
 from pipeline.problem import Problem
@@ -27,6 +28,12 @@ def built(folder: Path, name: str) -> tuple[Problem, BuiltSpecimen]:
     design = unchanged.write(path, "quick")
     net = network(datasets.read(design, "design"), "altered")
     return asked, build_specimen(net, asked.fabrication, (name, "altered"), design)
+
+
+@pytest.fixture(scope="module")
+def lattice(tmp_path_factory: pytest.TempPathFactory) -> tuple[Problem, BuiltSpecimen]:
+    """7 x 7 squares."""
+    return built(tmp_path_factory.mktemp("fig2"), "fig2")
 
 
 def test_both_triangles_of_a_cell_are_held_by_one_bar(tmp_path: Path) -> None:
@@ -59,6 +66,27 @@ def test_units_of_a_list_are_grouped_by_where_they_are() -> None:
     assert np.ptp([unit.design.centroid.y for unit in edges[0].units]) < 1.0
     corners = [units[n] for n in (0, 2, 3, 5)]
     assert held_edges(corners, listed, handmade.SPACING) == ([], corners)
+
+
+INNER = ("C4", "D4", "E4")
+
+
+@pytest.mark.parametrize(("clamped", "driven"), [(("D4",), ()), (INNER, ()), ((), INNER)])
+def test_inner_units_are_held_by_adapters(
+    lattice: tuple[Problem, BuiltSpecimen], clamped: tuple[str, ...], driven: tuple[str, ...]
+) -> None:
+    """Their neighbours leave no room for a base with a bolt."""
+    asked, whole = lattice
+    specimen = replace(whole, clamped=clamped, driven=driven)
+    made = fixtures(specimen, asked.fabrication, asked.lattice.spacing)
+    holders = {part.id: part for part in made if not part.id.startswith("JIG")}
+    kind = "CLAMP" if clamped else "DRIVE"
+    assert list(holders) == [f"{kind}-{label}" for label in clamped + driven]
+    for label in clamped + driven:
+        foot = holders[f"{kind}-{label}"].layers[1].area
+        seen = affinity.scale(foot, xfact=-1.0, origin=(0.0, 0.0))
+        unit = specimen.by_label[label].outline
+        assert seen.intersection(unit).area > 0.8 * unit.area
 
 
 @pytest.mark.parametrize("name", ["fig4"])
