@@ -1,6 +1,7 @@
 """Checks the folders print/ and fixture/: each part as a file of its own and on one plate."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,8 @@ _FOOTPRINT = np.array([0.02, 0.5, 0.98])  # shares of its height where a part's 
 _LEAST_SUNK = 0.1  # mm^2 of an id
 _LEAST_HELD = 0.08  # share of a unit that its holder covers
 _ROUND = 0.05  # by which the area of a polygon may be less than that of its circle, as a share
+_SHARED = 0.05  # mm^2 of two holders, of rounding
+_HOLDERS = ("CLAMP", "DRIVE")  # begin the names of what holds units that are clamped, or driven
 _LID = "-LID"  # ends the names of what is bolted on top
 
 
@@ -64,25 +67,26 @@ def check_fixtures(record: PackageRecord) -> Iterator[Fault]:
 
 
 def _check_holders(parts: Mapping[str, MeshBody], record: PackageRecord) -> Iterator[Fault]:
-    """Checks what holds units: part of each is on its holder, which has a hole for a bolt."""
-    expected, hole = record.expected, record.settings.fixture.hole
+    """Checks what holds units: part of each is on a holder; these have bolts, and are apart."""
+    expected, settings = record.expected, record.settings
     lids = {f"{name}{_LID}" for name in parts}
-    for kind, labels in (("CLAMP", expected.clamped), ("DRIVE", expected.driven)):
-        names = [name for name in parts if name.startswith(kind) and name not in lids]
-        bases = {name: _base(name, parts, record.settings) for name in names}
+    names = [name for name in parts if name.startswith(_HOLDERS) and name not in lids]
+    bases = {name: _base(name, parts, settings) for name in names}
+    for kind, labels in zip(_HOLDERS, (expected.clamped, expected.driven), strict=True):
         units = {label: expected.polygons[label] for label in labels if label in expected.polygons}
-        on = {
-            (u, n): _is_on(shape, base) for u, shape in units.items() for n, base in bases.items()
-        }
+        mine = [base for name, base in bases.items() if name.startswith(kind)]
         for label, shape in units.items():
-            if not any(on[label, name] for name in names):
+            if not any(_is_on(shape, base) for base in mine):
                 what, folder = "no part of the fixture holds it", record.folder / "fixture"
                 yield Fault(f"unit {label}", what, "fixture", BUG, folder, (shape,), shape)
-        for name, base in bases.items():
-            if not any(on[label, name] for label in units):
-                yield parts[name].fault("it holds none of the units that it is for", "fixture")
-            if not _is_bolted(base, hole):
-                yield parts[name].fault(f"it has no hole of {hole:g} mm for a bolt", "fixture.hole")
+    for name, base in bases.items():
+        if not _is_bolted(base, settings.fixture.hole):
+            what = f"it has no hole of {settings.fixture.hole:g} mm for a bolt"
+            yield parts[name].fault(what, "fixture.hole")
+    for one, other in combinations(bases, 2):
+        if bases[one].intersection(bases[other]).area > _SHARED:
+            remedy = "hold units that are farther apart"
+            yield parts[other].fault(f"it stands in the way of {one}", "fixture", remedy)
 
 
 def _base(name: str, parts: Mapping[str, MeshBody], settings: Fabrication) -> Geometry:

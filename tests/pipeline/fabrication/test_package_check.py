@@ -153,6 +153,10 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "bill": (edited("bom.csv", "unit,B2,1", "unit,B2,2"), "unit B2: it is there 2 times"),
     "another shim": (edited("bom.csv", "8.2500,8.1000", "8.2700,8.1000"), "it is not 8.27 x 8.10"),
     "clamp aside": (moved("fixture/CLAMP-A1.stl", 60.0), "unit A1: no part of the fixture holds"),
+    "clamps that collide": (
+        moved("fixture/CLAMP-A1.stl", 18.0),
+        "part DRIVE-B1: it stands in the way of CLAMP-A1",
+    ),
     "clamp without a bolt": (
         copied("fixture/JIG1.stl", "fixture/CLAMP-A1.stl"),
         "part CLAMP-A1: it has no hole of 4.2 mm for a bolt",

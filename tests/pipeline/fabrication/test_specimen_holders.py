@@ -1,6 +1,7 @@
 """Bars hold all units of an edge, and do not stand in one another's way."""
 
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from shapely import affinity
 
 from pipeline import datasets, problem
 from pipeline.fabrication.fixtures import fixtures
-from pipeline.fabrication.fixtures.holder_bases import held_edges
+from pipeline.fabrication.fixtures.holder_bases import held_edges, plan_bases
 from pipeline.fabrication.parts import BuiltSpecimen
 from pipeline.fabrication.units import build_specimen, network
 from pipeline.problem import Problem
@@ -87,6 +88,27 @@ def test_inner_units_are_held_by_adapters(
         seen = affinity.scale(foot, xfact=-1.0, origin=(0.0, 0.0))
         unit = specimen.by_label[label].outline
         assert seen.intersection(unit).area > 0.8 * unit.area
+
+
+@pytest.mark.parametrize(
+    ("clamped", "driven"),
+    [
+        (("A1", "B1"), ()),
+        (("A1",), ("B1",)),
+        (("A1", "B1", "A2"), ()),
+        (("A1", "B1", "C1"), ("A2",)),
+    ],
+)
+def test_neighbours_are_held_side_by_side(
+    lattice: tuple[Problem, BuiltSpecimen], clamped: tuple[str, ...], driven: tuple[str, ...]
+) -> None:
+    asked, whole = lattice
+    specimen = replace(whole, clamped=clamped, driven=driven)
+    bases, capped = plan_bases(specimen, asked.fabrication, asked.lattice.spacing)
+    assert {unit.label for base in bases for unit in base.held} == {*clamped, *driven}
+    assert not capped
+    for one, other in combinations(bases, 2):
+        assert one.area.distance(other.area) > 0.9
 
 
 @pytest.mark.parametrize("name", ["fig4"])
