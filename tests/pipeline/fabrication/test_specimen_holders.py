@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from shapely import affinity
+from shapely import Polygon, affinity
 
 from pipeline import datasets, problem
 from pipeline.fabrication.fixtures import fixtures
@@ -109,6 +109,18 @@ def test_neighbours_are_held_side_by_side(
     assert not capped
     for one, other in combinations(bases, 2):
         assert one.area.distance(other.area) > 0.9
+
+
+def test_all_pads_meet_one_breadboard(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On 5 x 8 units another shift of the board is nearer to those of a corner than of a side."""
+    monkeypatch.setattr(handmade, "COLUMNS", 5)
+    monkeypatch.setattr(handmade, "ROWS", 8)
+    specimen = replace(handmade.specimen(), clamped=("A1", "E8"), driven=("A4", "E5"))
+    bases, _ = plan_bases(specimen, handmade.ASKED, handmade.SPACING)
+    bolts = [Polygon(ring).centroid.coords[0] for base in bases for ring in base.area.interiors]
+    assert len(bolts) == len(bases) == 4
+    steps = np.subtract(bolts, bolts[0]) / handmade.ASKED.fixture.grid
+    assert np.abs(steps - np.round(steps)).max() < 1e-6
 
 
 @pytest.mark.parametrize("name", ["fig4"])
