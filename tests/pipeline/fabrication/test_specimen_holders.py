@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from shapely import Polygon, affinity
+from shapely import LineString, Polygon, affinity
 
 from pipeline import datasets, problem
 from pipeline.fabrication.fixtures import fixtures
@@ -15,7 +15,10 @@ from pipeline.fabrication.fixtures.holder_bases import held_edges, plan_bases
 from pipeline.fabrication.parts import BuiltSpecimen
 from pipeline.fabrication.units import build_specimen, network
 from pipeline.problem import Problem
+from pipeline.problem.fields import SIM_UNITS
+from pipeline.problem.sections import Fabrication
 from pipeline.runtime import ROOT
+from sim.core import Floats
 from tests.pipeline import unchanged
 from tests.pipeline.fabrication import handmade
 
@@ -121,6 +124,26 @@ def test_all_pads_meet_one_breadboard(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(bolts) == len(bases) == 4
     steps = np.subtract(bolts, bolts[0]) / handmade.ASKED.fixture.grid
     assert np.abs(steps - np.round(steps)).max() < 1e-6
+
+
+@pytest.mark.parametrize("thickness", [1.4, 3.0])
+def test_no_wall_stands_where_thick_shims_go(
+    thickness: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = Fabrication.model_validate({"shims": {"thickness": thickness}}, context=SIM_UNITS)
+    monkeypatch.setattr(handmade, "ASKED", asked)
+    specimen = handmade.specimen()
+    mouths: dict[int, list[Floats]] = {}
+    for slot in (slot for unit in specimen.units for slot in unit.slots):
+        mouths.setdefault(slot.ligament, []).extend([slot.end, slot.mouth])
+    ways = [LineString([ends[0], ends[1], ends[3], ends[2]]) for ends in mouths.values()]
+    shims = shapely.union_all(shapely.buffer(ways, thickness / 2, cap_style="flat"))
+    made = [part for part in fixtures(specimen, asked, handmade.SPACING) if "LID" not in part.id]
+    assert [part.id for part in made] == ["CLAMP-A1", "CLAMP-C2", "JIG1"]
+    for part in made:
+        walls = part.layers[2].area
+        assert walls.area > 10.0
+        assert walls.intersection(shims).area < 1e-6
 
 
 @pytest.mark.parametrize("name", ["fig4"])
