@@ -39,6 +39,7 @@ def check_laser(record: PackageRecord) -> Iterator[Fault]:
         if label in record.expected.polygons:
             yield from check_outline(label, file, shape, record.shapes)
     yield from _check_pins(record)
+    yield from _check_dots(record)
     shims = variants.get(("shims", NOMINAL), [])
     yield from check_shim_pieces(record.folder / BILL, shims)
     for drawing in (drawing for sheets in variants.values() for drawing in sheets):
@@ -78,11 +79,23 @@ def _check_pins(record: PackageRecord) -> Iterator[Fault]:
                 if abs(width - settings.laser.pin) > TOLERANCE:
                     what = f"a hole of {width:.3f} mm for pins of {settings.laser.pin:g} mm"
                     yield drawing.fault(what, part, (hole,), "laser.pin")
+    yield from _check_count(record, "pin", found, "laser.pin")
+
+
+def _check_dots(record: PackageRecord) -> Iterator[Fault]:
+    """Checks that the templates have a hole for each dot of the bill."""
+    sheets = record.drawings.get(("template", NOMINAL), [])
+    holes = [curve for sheet in sheets for curve in sheet.curves if curve.layer == INNER]
+    yield from _check_count(record, "dot", len(holes), "markers")
+
+
+def _check_count(record: PackageRecord, item: str, found: int, key: str) -> Iterator[Fault]:
+    """Checks that the bill lists as many of an item as there are holes for it."""
     path = record.folder / BILL
-    listed = sum(int(row["count"]) for row in read_bill(path) if row["item"] == "pin")
+    listed = sum(int(row["count"]) for row in read_bill(path) if row["item"] == item)
     if listed != found:
-        what = f"{listed} pins for {found} holes"
-        yield Fault("the bill of materials", what, "laser.pin", BUG, path)
+        what = f"{listed} {item}s for {found} holes"
+        yield Fault("the bill of materials", what, key, BUG, path)
 
 
 def _check_formats(drawing: Drawing, settings: Fabrication) -> Iterator[Fault]:

@@ -39,7 +39,7 @@ _KINDS = {"laser": "sheet", "print": "plate", "fixture": "fixture"}  # of files,
 class BillRow:
     """Holds one line of the bill. Lengths in mm, areas in mm^2, volumes in mm^3, masses in g."""
 
-    item: str  # unit, shim, ligament, pin, sheet, plate, fixture, foil (ways to handle it), total
+    item: str  # unit, shim, ligament, pin, dot, sheet, plate, fixture, foil (ways to it), total
     id: str  # of the part, the units that a ligament joins, or path of the file in the package
     count: int
     area: float | None = None  # of one piece, as all that follows
@@ -115,6 +115,7 @@ def bill_rows(
         yield BillRow(_KINDS[file.partition("/")[0]], file, count, note=note)
     if settings.laminated:
         yield _pins(specimen, settings)
+    yield _dots(specimen)
     yield from _foil(specimen, settings, contents)
     mass, volume = _sum(units, "mass"), _sum(units, "volume")
     solid = volume * settings.solid_density * _GRAMS
@@ -199,6 +200,12 @@ def _pins(specimen: BuiltSpecimen, settings: Fabrication) -> BillRow:
     return BillRow(
         "pin", f"PIN{pin:g}", total, length=settings.thickness, width=pin, height=pin, note=note
     )
+
+
+def _dots(specimen: BuiltSpecimen) -> BillRow:
+    """Counts the dots for the tracking."""
+    count = sum(len(unit.markers) for unit in specimen.units)
+    return BillRow("dot", "dots", count, note="to be marked through the holes of the template")
 
 
 def _foil(

@@ -167,6 +167,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     ),
     "pdf cut short": (halved("assembly.pdf"), "the assembly sheet"),
     "pins": (edited("bom.csv", "pin,PIN1.5,12", "pin,PIN1.5,11"), "11 pins for 12 holes"),
+    "dots": (edited("bom.csv", "dot,dots,12", "dot,dots,11"), "11 dots for 12 holes"),
     "id swapped": (
         edited(f"{UNITS}.dxf", "1000\nA1\n", "1000\nZ9\n", -1),
         "unit A1: it is missing",
