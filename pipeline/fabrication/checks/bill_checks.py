@@ -31,14 +31,14 @@ def check_bill(record: PackageRecord) -> Iterator[Fault]:
     left = {row["id"]: int(row["count"]) for row in shims}
     cut = {row["id"]: float(row["length_mm"]) for row in shims}
     taken = {row["id"]: _shim_of(row) for row in rows if row["item"] == "ligament"}
-    for pair, length in _shim_lengths(record):
-        name = " - ".join(pair)
-        shim = taken.get(name, "")
+    for number, length in _shim_lengths(record).items():
+        shim = taken.get(str(number), "")
         if -_PLAY <= length - cut.get(shim, -np.inf) <= SHIM_PLAY + _PLAY:
             left[shim] -= 1
         else:
             what = f"its shim {shim} does not fit {length:.2f} mm from slot end to slot end"
-            yield Fault(f"ligament {name}", what, "slots.depth", BUG, path)
+            pair = " - ".join(label for label, _ in record.expected.joints[number])
+            yield Fault(f"ligament {number}, {pair}", what, "slots.depth", BUG, path)
     for shim, spare in left.items():
         if spare < 1:
             what = f"{1 - spare} too few of shim {shim}, with one to spare"
@@ -46,12 +46,12 @@ def check_bill(record: PackageRecord) -> Iterator[Fault]:
 
 
 def _shim_of(row: Mapping[str, str]) -> str:
-    """Reads which shim a ligament takes."""
-    return row["note"].partition(";")[0].removeprefix("shim ")
+    """Reads which shim a ligament takes, behind the units that it joins."""
+    return row["note"].partition("; shim ")[2].partition(";")[0]
 
 
-def _shim_lengths(record: PackageRecord) -> Iterator[tuple[tuple[str, str], float]]:
-    """Measures ligaments from slot end to slot end along the shim, mm, by labels at the ends."""
+def _shim_lengths(record: PackageRecord) -> dict[int, float]:
+    """Measures ligaments from slot end to slot end along the shim, mm, by their numbers."""
     designs = record.expected.polygons
     depths = {
         (label, slot.vertex): slot.depth
@@ -59,12 +59,13 @@ def _shim_lengths(record: PackageRecord) -> Iterator[tuple[tuple[str, str], floa
         if isinstance(shape, Polygon)
         for slot in measured_slots(designs[label], shape, record.settings.slot_width)
     }
-    for joint in record.expected.joints:
+    lengths = {}
+    for number, joint in record.expected.joints.items():
         if all(end in depths for end in joint):
             mouths = [designs[label].exterior.coords[vertex] for label, vertex in joint]
             gap = float(np.linalg.norm(np.subtract(*mouths)))
-            (one, _), (other, _) = joint
-            yield (one, other), gap + sum(depths[end] for end in joint)
+            lengths[number] = gap + sum(depths[end] for end in joint)
+    return lengths
 
 
 def check_shim_pieces(path: Path, drawings: Sequence[Drawing]) -> Iterator[Fault]:

@@ -24,7 +24,8 @@ class ExpectedParts:
     """Holds the units of one structure of a design, by label."""
 
     polygons: dict[str, Polygon]  # outline as designed, in the specimen frame
-    joints: tuple[tuple[tuple[str, int], tuple[str, int]], ...]  # (label, vertex) of both ends
+    # (label, vertex) of both ends of ligaments, by their numbers
+    joints: dict[int, tuple[tuple[str, int], tuple[str, int]]]
     clamped: tuple[str, ...] = ()  # labels
     driven: tuple[str, ...] = ()  # likewise
 
@@ -32,7 +33,7 @@ class ExpectedParts:
     def slots(self) -> dict[str, list[int]]:
         """Vertices at which a ligament ends, one entry a ligament, by label."""
         vertices: dict[str, list[int]] = {label: [] for label in self.polygons}
-        for label, vertex in sorted(end for joint in self.joints for end in joint):
+        for label, vertex in sorted(end for joint in self.joints.values() for end in joint):
             vertices[label].append(vertex)
         return vertices
 
@@ -41,10 +42,12 @@ def expected_parts(design: xr.Dataset, structure: str) -> ExpectedParts:
     """Reads the parts of the structure intact, altered or cloaked."""
     net = network(design, structure)
     polygons = {net.labels[number]: net.polygons[number] for number in net.numbers}
-    joints = ((net.labels[a], p, net.labels[b], q) for _, (a, p), (b, q), _ in net.ligaments)
-    ends = tuple(((one, p), (other, q)) for one, p, other, q in joints)
+    joints = {
+        number: ((net.labels[a], p), (net.labels[b], q))
+        for number, (a, p), (b, q), _ in net.ligaments
+    }
     clamped, driven = (tuple(net.labels[n] for n in held) for held in (net.clamped, net.driven))
-    return ExpectedParts(polygons, ends, clamped, driven)
+    return ExpectedParts(polygons, joints, clamped, driven)
 
 
 @dataclass(frozen=True)

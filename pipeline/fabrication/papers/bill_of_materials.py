@@ -40,7 +40,7 @@ class BillRow:
     """Holds one line of the bill. Lengths in mm, areas in mm^2, volumes in mm^3, masses in g."""
 
     item: str  # unit, shim, ligament, pin, dot, sheet, plate, fixture, foil (ways to it), total
-    id: str  # of the part, the units that a ligament joins, or path of the file in the package
+    id: str  # of the part, number of a ligament, or path of the file in the package
     count: int
     area: float | None = None  # of one piece, as all that follows
     volume: float | None = None  # as if it were solid
@@ -103,8 +103,8 @@ def bill_rows(
     yield from shims
     kinds = {number: shim.id for shim in specimen.shims for number in shim.ligaments}
     for ligament in specimen.ligaments:
-        note = f"shim {kinds[ligament.number]}; {prebend_words(ligament)}"
-        yield BillRow("ligament", ligament.name, 1, length=ligament.length, note=note)
+        note = f"{ligament.name}; shim {kinds[ligament.number]}; {prebend_words(ligament)}"
+        yield BillRow("ligament", str(ligament.number), 1, length=ligament.length, note=note)
     for file, parts in contents.items():
         note, count = _counted(len(parts), "part"), 1
         if file.startswith("laser/units_"):

@@ -17,9 +17,9 @@ _READ = ("units", "letters_for_ids", "shims", "prebend", "as_built", "thin_walls
 
 
 PREBEND_NOTE = (
-    "each shim before any load: middle of its ligament; angles of its slots against the ligament,"
-    " counter-clockwise; largest strain and largest moment, of a strip clamped where the walls of"
-    " its slots begin (small slopes)"
+    "each shim before any load, by the number of its ligament: units that it joins; middle of the"
+    " ligament; angles of its slots against it, counter-clockwise; largest strain and largest"
+    " moment, of a strip clamped where the walls of its slots begin (small slopes)"
 )
 
 
@@ -68,7 +68,7 @@ def write_manifest(
         "units": [unit.label for unit in specimen.units],
         "letters_for_ids": specimen.letters,
         "shims": {shim.id: shim.count for shim in specimen.shims},
-        "prebend": {ligament.name: _prebend(ligament) for ligament in specimen.ligaments},
+        "prebend": {str(one.number): _prebend(one) for one in specimen.ligaments},
         "prebend_note": PREBEND_NOTE,
         "as_built": as_built,
         "thin_walls_mm": {label: round(wall, 3) for label, wall in specimen.thin.items()},
@@ -80,8 +80,9 @@ def write_manifest(
     (folder / MANIFEST).write_text(text + "\n", encoding="utf-8", newline="\n")
 
 
-def _prebend(ligament: Ligament) -> dict[str, float | list[float]]:
+def _prebend(ligament: Ligament) -> dict[str, str | float | list[float]]:
     return {
+        "units": ligament.name,
         "middle_mm": [round(x, 3) for x in ligament.middle],
         "end_angles_deg": [round(math.degrees(angle), 2) for angle in ligament.angles],
         "strain": round(ligament.strain, 5),

@@ -116,7 +116,7 @@ def test_a_unit_that_grew_to_twice_its_size_is_found_in_its_place() -> None:
     thin, beside = Polygon([(0, 0), (9, 0), (9, 1), (0, 1)]), Polygon([(0, 4), (9, 4), (9, 9)])
     grown = thin.buffer(1.0, join_style="mitre")
     solid = SimpleNamespace(section=lambda _height: MultiPolygon([beside, grown]))
-    expected = ExpectedParts({"A1": thin, "A2": beside}, ())
+    expected = ExpectedParts({"A1": thin, "A2": beside}, {})
     sections = unit_sections(cast("MeshBody", solid), expected, SETTINGS)
     assert sections["A1"].equals(grown)
     assert sections["A2"].equals(beside)

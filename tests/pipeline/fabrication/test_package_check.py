@@ -25,7 +25,7 @@ from pipeline.problem import Problem
 from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.sections import Fabrication
 from pipeline.runtime import UserError
-from tests.pipeline.fabrication import built
+from tests.pipeline.fabrication import built, handmade
 from tests.pipeline.fabrication.files import write_stl
 from tests.tables import cases, some, tables
 
@@ -252,6 +252,24 @@ def test_the_bill_says_which_files_hold_each_unit_and_shim(whole: tuple[Path, Pr
     files = [row["files"].split() for row in rows]
     assert all(files)
     assert all((whole[0] / name).is_file() for names in files for name in names)
+
+
+def test_two_ligaments_of_one_pair_of_units_are_told_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second one joins the lower corners of A1 and B1."""
+    pairs = [*handmade.neighbours(), ((0, 3), (1, 3))]
+    monkeypatch.setattr(handmade, "neighbours", lambda: pairs)
+    folder = tmp_path / "cloaked"
+    asked = built.write(folder, {"shims": {"prebend_strain": 0.9}})
+    check(folder, asked)
+    told = json.loads((folder / MANIFEST).read_text())["prebend"]
+    assert len(told) == len(pairs)
+    both = [one["middle_mm"] for one in told.values() if one["units"] == "A1 - B1"]
+    assert len(both) == 2
+    rows = [row for row in read_bill(folder / BILL) if row["item"] == "ligament"]
+    assert len({row["id"] for row in rows}) == len(rows)
+    assert sum(row["note"].startswith("A1 - B1; shim S") for row in rows) == 2
 
 
 DxfVersion: TypeAlias = Literal["R2010", "R12"]
