@@ -77,6 +77,7 @@ class FlatPart:
     engraving: Strokes = ()  # lettering and orientation mark, to be read from the top
     scores: Strokes = ()  # lines to fold or to mark along
     tabs: tuple[Circle, ...] = ()  # where the outline is not cut, so that its sheet holds the part
+    slot: float = np.inf  # width of its narrowest slot
 
     @property
     def cuts(self) -> list[Floats]:
@@ -169,7 +170,8 @@ class Unit:
     def part(self) -> FlatPart:
         """The unit, or each of its layers, as a part to be cut."""
         engraved = self.lettering + self.mark
-        return FlatPart(self.label, self.outline, self.height, self.pins, engraved)
+        width = min((slot.width for slot in self.slots), default=np.inf)
+        return FlatPart(self.label, self.outline, self.height, self.pins, engraved, slot=width)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from pipeline.runtime import UserError
 MITRE = 5.0
 """Corners of cuts with the kerf made good reach at most so many offsets out."""
 
-_SHORT = 1e-4  # mm; shorter edges are left out
+_SHORT = 1e-4  # mm; shorter edges are left out, narrower slots are closed
 _FILLED = 0.2  # mm^2 that a kerf may fill, in narrow corners
 
 
@@ -59,8 +59,10 @@ def compensated(part: FlatPart, kerf: float, file: str) -> FlatPart:
     grown = part.outline.buffer(kerf / 2, join_style="mitre", mitre_limit=MITRE)
     simple = isinstance(grown, Polygon) and len(grown.interiors) == 0
     filled = grown.buffer(-kerf / 2, join_style="mitre").difference(part.outline).area
-    if not simple or filled > _FILLED or any(hole.diameter <= kerf for hole in part.holes):
-        what = f"a kerf of {kerf:g} mm closes a slot or a hole of part {part.id}"
+    narrow = part.slot <= kerf + _SHORT
+    if narrow or not simple or filled > _FILLED or any(h.diameter <= kerf for h in part.holes):
+        closed = f"a slot of {part.slot:g} mm" if narrow else "a slot or a hole"
+        what = f"a kerf of {kerf:g} mm closes {closed} of part {part.id}"
         remedy = "lower it, or raise fabrication.slots.clearance and those of fabrication.coupon"
         raise UserError(what, file=file, key="fabrication.laser.kerf", remedy=remedy)
     outline = shapely.orient_polygons(grown.simplify(_SHORT))
