@@ -29,6 +29,7 @@ _FOOTPRINT = np.array([0.02, 0.5, 0.98])  # shares of its height where a part's 
 _LEAST_SUNK = 0.1  # mm^2 of an id
 _LEAST_HELD = 0.08  # share of a unit that its holder covers
 _ROUND = 0.05  # by which the area of a polygon may be less than that of its circle, as a share
+_ABOVE_ID = 0.75  # share of the base's thickness, of which an id takes half at most
 _SHARED = 0.05  # mm^2 of two holders, of rounding
 _HOLDERS = ("CLAMP", "DRIVE")  # begin the names of what holds units that are clamped, or driven
 _LID = "-LID"  # ends the names of what is bolted on top
@@ -91,7 +92,7 @@ def _check_holders(parts: Mapping[str, MeshBody], record: PackageRecord) -> Iter
 
 def _base(name: str, parts: Mapping[str, MeshBody], settings: Fabrication) -> Geometry:
     """Cuts a holder above its id, as it is used: an adapter, without a lid, lies on its back."""
-    area = parts[name].section((settings.labels.depth + settings.fixture.base) / 2)
+    area = parts[name].section(_ABOVE_ID * settings.fixture.base)
     if f"{name}{_LID}" in parts:
         return area
     return affinity.scale(area, xfact=-1.0, origin=(0.0, 0.0))

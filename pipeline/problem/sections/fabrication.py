@@ -111,7 +111,7 @@ class Labels(Section):
     Attributes:
         height: of the letters; smaller where there is no room.
         stroke: width of their strokes.
-        depth: of their strokes.
+        depth: of their strokes; in a thin plate of the fixture half of its thickness.
     """
 
     height: Length = 3.0

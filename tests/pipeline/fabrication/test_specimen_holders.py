@@ -1,7 +1,7 @@
 """Bars hold all units of an edge, and do not stand in one another's way."""
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -144,6 +144,20 @@ def test_no_wall_stands_where_thick_shims_go(
         walls = part.layers[2].area
         assert walls.area > 10.0
         assert walls.intersection(shims).area < 1e-6
+
+
+@pytest.mark.parametrize(("depth", "base"), [(3.0, 0.4), (2.5, 0.3), (0.4, 0.4), (0.4, 4.0)])
+def test_letters_take_half_of_a_thin_base_at_most(depth: float, base: float) -> None:
+    given = {"labels": {"depth": depth}, "fixture": {"base": base}}
+    asked = Fabrication.model_validate(given, context=SIM_UNITS)
+    made = list(fixtures(handmade.specimen(), asked, handmade.SPACING))
+    for part in made:
+        assert part.layers[0].bottom == 0.0
+        assert all(layer.top > layer.bottom for layer in part.layers)
+        assert all(below.top == above.bottom for below, above in pairwise(part.layers))
+    (clamp,) = (part for part in made if part.id == "CLAMP-A1")
+    assert clamp.layers[0].top == min(depth, base / 2)
+    assert clamp.layers[1].top == base
 
 
 @pytest.mark.parametrize("name", ["fig4"])
