@@ -149,7 +149,7 @@ def check_tabs(drawing: Drawing, settings: Fabrication) -> Iterator[Fault]:
 def check_scale(drawing: Drawing, laser: Laser) -> Iterator[Fault]:
     """Checks that the file is in millimetres and as large as the sheet."""
     if drawing.file.suffix == ".svg":
-        width, height = (f"{length:g}" for length in laser.sheet)
+        width, height = (f"{round(length, 5):.9g}" for length in laser.sheet)
         head = _SVG.search(drawing.file.read_text(encoding="utf-8"))
         page = f'width="{width}mm"', f'height="{height}mm"', f'viewBox="0 0 {width} {height}"'
         for words in page:

@@ -93,12 +93,12 @@ def _add_line(space: Modelspace, points: Floats, layer: str, *, closed: bool = F
 
 def write_svg(sheet: LaserSheet, path: Path) -> None:
     """Writes a sheet; y points up on the sheet and down in the file."""
-    width, height = sheet.size
+    width, height = map(_number, sheet.size)
     head = (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
         '<svg xmlns="http://www.w3.org/2000/svg"'
         ' xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape"'
-        f' width="{width:g}mm" height="{height:g}mm" viewBox="0 0 {width:g} {height:g}">\n'
+        f' width="{width}mm" height="{height}mm" viewBox="0 0 {width} {height}">\n'
         f"<title>{sheet.name}</title>\n"
     )
     body = "".join(_layer(name, sheet) for name in COLOURS)
@@ -120,7 +120,7 @@ def _layer(name: str, sheet: LaserSheet) -> str:
 def _shapes(layer: str, sheet: LaserSheet) -> Iterator[str]:
     width, height = sheet.size
     if layer == "REFERENCE":
-        yield f'<path d="M0,0H{width:g}V{height:g}H0Z"/>'
+        yield f'<path d="M0,0H{_number(width)}V{_number(height)}H0Z"/>'
     for part in sheet.parts:
         for stroke in {"ENGRAVE": part.engraving, "SCORE": part.scores}.get(layer, ()):
             yield f'<path d="M{_pairs(stroke, height)}"/>'

@@ -17,7 +17,8 @@ from pipeline.fabrication.checks import check_package, laser_folder, package_rec
 from pipeline.fabrication.checks.assembled_specimen import unit_sections
 from pipeline.fabrication.checks.bill_checks import check_bill
 from pipeline.fabrication.checks.package_record import PackageRecord, expected_parts
-from pipeline.fabrication.files.drawing_files import write_dxf
+from pipeline.fabrication.checks.sheet_checks import check_scale
+from pipeline.fabrication.files.drawing_files import write_dxf, write_svg
 from pipeline.fabrication.papers import BILL, MANIFEST, read_bill
 from pipeline.fabrication.plates import LaserSheet
 from pipeline.fabrication.readback import Drawing, faults, read_drawing, read_stl
@@ -283,6 +284,15 @@ def test_a_drawing_says_how_far_it_extends(tmp_path: Path, version: DxfVersion) 
     header = readfile(tmp_path / "empty.dxf").header
     assert tuple(header["$EXTMIN"])[:2] == (0.0, 0.0)
     assert tuple(header["$EXTMAX"])[:2] == (600.0, 300.0)
+
+
+def test_a_sheet_in_fractions_of_an_inch_is_as_large_as_asked_for(tmp_path: Path) -> None:
+    given = {"laser": {"sheet": ["48.0625 in", "24 in"]}}
+    laser = Fabrication.model_validate(given, context=SIM_UNITS).laser
+    path = tmp_path / "empty.svg"
+    write_svg(LaserSheet("empty", laser.sheet, ()), path)
+    assert 'width="1220.7875mm" height="609.6mm"' in path.read_text(encoding="utf-8")
+    assert list(check_scale(read_drawing(path), laser)) == []
 
 
 @pytest.mark.parametrize("name", some(OPTIONS, 1))
