@@ -98,8 +98,11 @@ def _dark(held: bytes, threshold: float | None, invert: bool) -> NDArray[np.uint
     cv2.utils.logging.setLogLevel(
         cv2.utils.logging.LOG_LEVEL_SILENT
     )  # the error below tells it all
+    stored = np.frombuffer(held, np.uint8)
     try:
-        pixels = cv2.imdecode(np.frombuffer(held, np.uint8), cv2.IMREAD_UNCHANGED)
+        pixels = cv2.imdecode(stored, cv2.IMREAD_UNCHANGED)
+        if pixels is not None and pixels.shape[2:] != (4,):  # turned by EXIF, but without cover
+            pixels = cv2.imdecode(stored, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
     except cv2.error:  # empty, or too many pixels, among others
         pixels = None
     if pixels is None or pixels.dtype != np.uint8:

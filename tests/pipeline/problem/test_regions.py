@@ -63,6 +63,32 @@ def test_a_light_or_coloured_shape_is_read_as_a_dark_one(kind: str, tmp_path: Pa
     assert read_outlines(tmp_path / "light.png", invert=True, **asked) == read_outlines(dark)
 
 
+@pytest.mark.parametrize("marked", [1, 2, 3, 4, 5, 6, 7, 8])
+def test_a_photograph_is_read_upright(marked: int, tmp_path: Path) -> None:
+    """A phone stores the sensor's rows, and in EXIF how to turn them."""
+    upright = np.asarray(cv2.imread(str(draw(tmp_path / "l.png")), cv2.IMREAD_GRAYSCALE))
+    stored = {
+        1: upright,
+        2: upright[:, ::-1],
+        3: upright[::-1, ::-1],
+        4: upright[::-1],
+        5: upright.T,
+        6: upright.T[::-1],
+        7: upright.T[::-1, ::-1],
+        8: upright.T[:, ::-1],
+    }[marked]
+    entry = (0x0112).to_bytes(2) + (3).to_bytes(2) + (1).to_bytes(4) + marked.to_bytes(2) + b"\0\0"
+    exif = b"Exif\0\0MM\0*" + (8).to_bytes(4) + (1).to_bytes(2) + entry + bytes(4)
+    photograph = cv2.imencode(".jpg", np.ascontiguousarray(stored))[1].tobytes()
+    path = tmp_path / "l.jpg"
+    segment = b"\xff\xe1" + (2 + len(exif)).to_bytes(2) + exif
+    path.write_bytes(photograph[:2] + segment + photograph[2:])
+    seen = read_outlines(path)
+    np.testing.assert_allclose(box(seen), [[30, -79], [69, -20]], atol=1.5)
+    stem_foot_and_neither = [(37.0, -30.0), (60.0, -72.0), (60.0, -30.0)]
+    assert find_inside(stem_foot_and_neither, seen, 1e-9) == [True, True, False]
+
+
 @cases("problem", "drawn, what")
 def test_text_and_open_strokes_are_to_be_converted(drawn: str, what: str, tmp_path: Path) -> None:
     path = tmp_path / "my logo.svg"
