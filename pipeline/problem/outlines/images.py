@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
@@ -44,8 +46,8 @@ def read_outlines(
     """Reads closed outlines of the shape in a PNG, JPG or SVG, y up, in pixels or the file's unit.
 
     A point within an odd number of them lies in the shape. A pixel is in it below the `threshold`,
-    a grey level from 0 of black to 1 of white; without it, an image must be binary. `invert` takes
-    what is light.
+    a grey level from 0 of black to 1 of white; without it, an image must be binary. So is a part of
+    a drawing, whose light parts cut those they lie on. `invert` takes what is light.
 
     Raises:
         UserError: no such file, unreadable, not binary, or without a shape.
@@ -55,16 +57,14 @@ def read_outlines(
     except OSError as error:
         what = f"the image cannot be read: {error.strerror}"
         raise UserError(what, remedy="give its path as seen from the problem file") from error
-    if path.suffix.lower() != ".svg":
-        outlines = _of_pixels(_dark(held, threshold, invert))
-    elif threshold is None and not invert:
-        outlines = _of_drawing(path)
+    if path.suffix.lower() == ".svg":
+        outlines = _of_drawing(path, threshold, invert)
     else:
-        what = "a drawing has no grey levels"
-        raise UserError(what, remedy="remove `threshold` and `invert`; its filled parts are read")
+        outlines = _of_pixels(_dark(held, threshold, invert))
     if not outlines:
         remedy = (
-            "draw it dark on a light ground, or say that it is light: `invert: true` (`--invert`)"
+            "draw it dark on a light ground; or say that it is light, `invert: true` (`--invert`),"
+            " or below which grey level it is dark, `threshold: 0.5` (`--threshold 0.5`)"
         )
         raise UserError("the image shows no shape", remedy=remedy)
     read = tuple(
@@ -130,7 +130,7 @@ def _dark(held: bytes, threshold: float | None, invert: bool) -> NDArray[np.uint
     return ((grey >= level) if invert else (grey < level)).astype(np.uint8)
 
 
-def _of_drawing(path: Path) -> list[NDArray[Any]]:
+def _of_drawing(path: Path, threshold: float | None, invert: bool) -> list[NDArray[Any]]:
     try:
         _check_depth(path)
         _check_copies(ElementTree.parse(path).getroot())
@@ -139,13 +139,39 @@ def _of_drawing(path: Path) -> list[NDArray[Any]]:
         count = min(SEGMENTS, MOST_POINTS // max(1, sum(map(len, paths))))
         if count < 2:
             raise ValueError(f"it has more than {MOST_POINTS // 2} pieces; simplify it")
-        found = [points for each in paths for points in _pieces(each, count) if len(points) > 2]
-        if any(not (np.abs(points) < FARTHEST).all() for points in found):
+        drawn = [[points for points in _pieces(each, count) if len(points) > 2] for each in paths]
+        if any(not (np.abs(points) < FARTHEST).all() for pieces in drawn for points in pieces):
             raise ValueError(f"it has points further than {FARTHEST:g} from its origin")
     # an XML parse error is a SyntaxError; a radius or a scale of 1e-300 divides by zero
     except (OSError, ValueError, SyntaxError, ArithmeticError, RecursionError) as error:
         raise UserError(f"not a readable SVG: {error}", remedy="save it as plain SVG") from error
-    return found
+    level = LIGHT if threshold is None else 255 * threshold
+    return _painted([((_grey(each) < level) != invert) for each in paths], drawn)
+
+
+def _grey(path: SvgPath) -> float:
+    """Returns the grey level, of 255, of a path's fill, or else of its stroke, black without."""
+    for paint in (path.fill, path.stroke):
+        if paint is not None and paint.value is not None and paint.alpha:
+            return (paint.red + paint.green + paint.blue) / 3
+    return 0.0
+
+
+def _painted(shown: list[bool], drawn: list[list[NDArray[Any]]]) -> list[NDArray[Any]]:
+    """Lists outlines of what is shown by the pieces of paths, each painted over those before it."""
+    if all(shown):
+        return [points for pieces in drawn for points in pieces]
+    import shapely
+
+    shape = shapely.Polygon()
+    layers = groupby(zip(shown, drawn, strict=True), key=itemgetter(0))
+    for in_shape, layer in layers:
+        rings = [shapely.Polygon(points) for _, pieces in layer for points in pieces]
+        area = shapely.make_valid(shapely.MultiPolygon(rings))  # what an odd number of them cover
+        shape = shape | area if in_shape else shape - area
+    parts = [part for part in shapely.get_parts(shape) if part.area > 0.0]
+    rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
+    return [np.array(ring.coords)[:-1] for ring in rings]
 
 
 def _parsed(path: Path) -> tuple[list[Any], list[SvgPath]]:

@@ -216,14 +216,14 @@ Curve = Annotated[Heart | Smile | Formula, Field(discriminator="kind")]
 
 
 class Image(Section):
-    """Dark part of a binary image (PNG, JPG) or fill of an SVG, upright as one sees it.
+    """Dark part of a binary image (PNG, JPG) or of an SVG's fills, upright as one sees it.
 
     The outline is read from the file when the problem is.
 
     Attributes:
         file: as seen from the problem file.
-        threshold: grey level, from 0 of black to 1 of white, below which a pixel is dark; without
-            it the image must be binary.
+        threshold: grey level, from 0 of black to 1 of white, below which a pixel or a fill is dark;
+            without it an image of pixels must be binary.
         invert: whether the shape is light on a dark or a transparent ground.
         size: width and height to which the box around the shape is scaled; or `width`.
         width: to which it is scaled with its proportions kept; or `size`.

@@ -1,6 +1,7 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -99,6 +100,29 @@ def test_text_and_open_strokes_are_to_be_converted(drawn: str, what: str, tmp_pa
     path.write_text(f"{head}{square}{drawn}</svg>")
     with refused(what, remedy="to paths"):
         read_outlines(path)
+
+
+GROUND = '<rect width="100" height="100" fill="{}"/>'
+LETTER = '<path fill="{}" d="M30 20 h15 v45 h25 v15 h-40 z"/>'
+
+
+@cases("problem", "ground, over, asked")
+def test_a_drawing_is_read_by_its_colours(
+    ground: str, over: str, asked: dict[str, Any], tmp_path: Path
+) -> None:
+    """An L over a ground, and a light mark over the L and beyond it."""
+    path = tmp_path / "l.svg"
+    head = '<svg xmlns="http://www.w3.org/2000/svg" width="100" height="100">'
+    mark = f'<rect x="25" y="65" width="15" height="30" fill="{ground}"/>'
+    path.write_text(f"{head}{GROUND.format(ground)}{LETTER.format(over)}{mark}</svg>")
+    (drawn,) = read_outlines(path, **asked)
+    assert set(drawn) == {
+        *((30.0, -20.0), (45.0, -20.0), (45.0, -65.0), (70.0, -65.0)),
+        *((70.0, -80.0), (40.0, -80.0), (40.0, -65.0), (30.0, -65.0)),
+    }
+    path.write_text(f"{head}{GROUND.format(ground)}</svg>")
+    with refused("the image shows no shape", remedy="invert: true"):
+        read_outlines(path, **asked)
 
 
 @cases("problem", "name, size, x0")

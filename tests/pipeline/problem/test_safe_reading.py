@@ -153,9 +153,10 @@ HOSTILE = {
 @pytest.mark.parametrize("content", HOSTILE.values(), ids=HOSTILE)
 def test_a_hostile_drawing_is_one_message(content: str, tmp_path: Path) -> None:
     path = tmp_path / "void.svg"
-    path.write_text(SVG.format(content))
-    with pytest.raises(UserError, match=r"not a readable SVG|no width"):
-        images.read_outlines(path)
+    for ground in ("", '<path fill="#fff" d="M1 1 H3 V3 Z"/>'):
+        path.write_text(SVG.format(content + ground))
+        with pytest.raises(UserError, match=r"not a readable SVG|shows no shape|no width"):
+            images.read_outlines(path)
     path.write_text(SVG.format(TRIANGLE).replace("svg", "sug"))
     with refused("does not begin with an element svg"):
         images.read_outlines(path)
