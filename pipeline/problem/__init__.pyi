@@ -2,6 +2,7 @@ from .identity import canonical_json as canonical_json
 from .identity import content_hash as content_hash
 from .identity import from_canonical as from_canonical
 from .identity import section_hash as section_hash
+from .model import SWITCHES as SWITCHES
 from .model import Problem as Problem
 from .reading import load as load
 from .sections import selected_units as selected_units

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pipeline.problem.fields import SIM_UNITS
-from pipeline.problem.model import Problem
+from pipeline.problem.model import SWITCHES, Problem
 from pipeline.runtime import STAGES
 
 REPORT = "report"
@@ -20,6 +20,7 @@ def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = N
     other optimisation methods than one that is given.
     """
     data = problem.model_dump(mode="json", by_alias=True, exclude_none=True)
+    _keep_switches(data)
     for name in () if stage == REPORT else STAGES[stage].unused or ():
         data.pop(name, None)
     limits = data.get("constraints")
@@ -35,6 +36,16 @@ def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = N
         methods = data["optimiser"]["methods"]
         data["optimiser"]["methods"] = {method: methods[method]}
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _keep_switches(data: dict[str, Any]) -> None:
+    """Writes null for what is off though it is on by default, in a problem as dumped."""
+    for *above, last in SWITCHES:
+        section = data
+        for key in above:
+            section = section.get(key, {})
+        if section:
+            section.setdefault(last, None)
 
 
 def _fabrication_of_design(problem: Problem, limits: Mapping[str, Any]) -> dict[str, Any]:

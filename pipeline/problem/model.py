@@ -44,6 +44,8 @@ from pipeline.problem.sections import (
     single_drives,
 )
 
+SWITCHES = frozenset({("robustness", "together"), ("fabrication", "shims", "tabs")})
+"""Keys that are on by default, and off with null."""
 _STATIC_INFILL = 0.15
 
 

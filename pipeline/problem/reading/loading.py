@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from pipeline.problem import Problem
+from pipeline.problem import SWITCHES, Problem
 from pipeline.problem.fields import FOLDER, Section
 from pipeline.problem.reading import yaml_file
 from pipeline.problem.reading.feasibility import find_faults
@@ -93,15 +93,20 @@ def _check_sweep(
             raise _user_error(document, preset, data, place, str(error), _KEYS) from error
 
 
-def overlay_keys(base: Mapping[str, Any], overlay: Mapping[str, Any]) -> dict[str, Any]:
-    """Lays `overlay` over `base`: mappings merge, all else replaces, null removes a key."""
+def overlay_keys(
+    base: Mapping[str, Any], overlay: Mapping[str, Any], above: KeyPath = ()
+) -> dict[str, Any]:
+    """Lays `overlay` over `base`, both below the keys `above`.
+
+    Mappings merge, all else replaces, null removes a key or turns off what is on by default.
+    """
     merged = dict(base)
     for key, value in overlay.items():
-        below = merged.get(key)
-        if value is None:
+        below, path = merged.get(key), (*above, key)
+        if value is None and path not in SWITCHES:
             merged.pop(key, None)
         elif isinstance(value, Mapping):
-            merged[key] = overlay_keys(below if isinstance(below, Mapping) else {}, value)
+            merged[key] = overlay_keys(below if isinstance(below, Mapping) else {}, value, path)
         else:
             merged[key] = value
     return merged

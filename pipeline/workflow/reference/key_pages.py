@@ -18,7 +18,8 @@ Node = dict[str, Any]
 
 PRESETS = """
 `presets` holds variants by name. Each has keys that are laid over those of the file: mappings
-merge, lists and values replace, `null` removes. `make fig2@edge3` builds one.
+merge, lists and values replace, `null` removes, or turns off what is on by default.
+`make fig2@edge3` builds one.
 """
 _DIMENSIONS = {
     each.example: each for each in vars(units).values() if isinstance(each, units.Dimension)

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
 from pipeline.posing import limits_of, scene_of
 from pipeline.problem import (
+    SWITCHES,
     Problem,
     canonical_json,
     cloak_units,
@@ -120,6 +122,39 @@ def test_overlays_win_idempotently(base: dict[str, object], overlay: dict[str, o
 
 def test_null_removes_a_key() -> None:
     assert overlay_keys({"a": {"b": 1, "c": 2}}, {"a": {"b": None}}) == {"a": {"c": 2}}
+
+
+def test_null_turns_off_what_is_on_by_default(fig2: Path, tmp_path: Path) -> None:
+    """In the file and in a preset; and what is off stays so in the problem that a file holds."""
+    content = yaml.safe_load(fig2.read_bytes())
+    off = {"robustness": {"together": None}, "fabrication": {"shims": {"tabs": None}}}
+    path = tmp_path / "problem.yaml"
+    path.write_text(yaml.safe_dump(content | {"presets": {"off": off}}))
+    on, overlaid = load(path), load(path, "off")
+    del content["presets"]
+    content["robustness"]["together"] = None
+    path.write_text(yaml.safe_dump(content | {"fabrication": off["fabrication"]}))
+    assert load(path) == overlaid
+    assert on.robustness is not None
+    assert on.robustness.together is not None
+    again = from_canonical(canonical_json(overlaid))
+    for asked in (overlaid, again):
+        assert asked.robustness is not None
+        assert asked.robustness.together is None
+        assert asked.fabrication.shims.tabs is None
+    assert content_hash(again) == content_hash(overlaid) != content_hash(on)
+
+
+def test_all_that_null_turns_off_is_listed() -> None:
+    parts = {"problem": Problem.model_json_schema()}
+    parts |= parts["problem"]["$defs"]
+    found = {
+        key
+        for part in parts.values()
+        for key, asked in part.get("properties", {}).items()
+        if asked.get("default") is not None and {"type": "null"} in asked.get("anyOf", [])
+    }
+    assert found == {switch[-1] for switch in SWITCHES}
 
 
 SERIES = "drive:\n  kind: time_series\n  units: centre\n  file: motion.csv\n"
