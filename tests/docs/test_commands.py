@@ -5,19 +5,21 @@ targets are planned by make and by Snakemake, and the options of stages are read
 """
 
 import argparse
+import re
 import runpy
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
 from functools import partial
+from itertools import cycle, repeat
 from typing import Any
 
 import pytest
 
 from pipeline.__main__ import main, run_stage
 from pipeline.runtime import ROOT, STAGES
-from tests.docs.pages import PAGES, WALKED, Command, blocks, commands, inline
+from tests.docs.pages import PAGES, WALKED, Command, blocks, commands, inline, text
 from tests.e2e.checkout import Checkout
 
 COMMANDS = list(commands())
@@ -116,6 +118,33 @@ def test_commands_and_files_in_a_sentence_are_there() -> None:
         assert module != "pipeline" or not stage or stage in STAGES
     for name in set(inline(r"((?:sim|pipeline|reports|tests|experiments|docs)/[a-z_/.]+)")):
         assert (ROOT / name).exists() or "logo" in name, name
+
+
+def test_what_jobs_ask_for_on_a_cluster_is_what_their_rules_say() -> None:
+    rules = "".join(path.read_text() for path in (ROOT / "pipeline/rules").glob("*.smk"))
+    bodies = dict(re.findall(r"^rule (\w+):\n((?:    .*\n|\n)*)", rules, re.MULTILINE))
+    asked = {
+        name: (int(found[1]) // 1000, int(found[2]))
+        for name, body in bodies.items()
+        if (found := re.search(r"mem_mb=(\d+),\n\s*runtime=(\d+),", body))
+    }
+    page = text("docs/cluster.md")
+    told = {}
+    for names, memory, times in re.findall(
+        r"^\| (`.*?) \| (\d+) GB \| (.*?) \|", page, re.MULTILINE
+    ):
+        rows = names.replace("`", "").split(", ")
+        hours = [60 * int(each.removesuffix(" h")) for each in times.split(", ")]
+        told |= zip(rows, zip(repeat(int(memory)), cycle(hours), strict=False), strict=False)
+    assert told == asked
+    gathered = re.search(r"What only joins files \((.*?)\)", page)
+    two = re.search(r"on one core \((.*?) on two\)", page)
+    assert gathered
+    assert two
+    local = {name for name, body in bodies.items() if "localrule: True" in body}
+    assert set(re.findall(r"`(\w+)`", gathered[1])) == local - {"clean"}
+    threaded = {name for name, body in bodies.items() if "threads: 2" in body}
+    assert set(re.findall(r"`(\w+)`", two[1])) == threaded
 
 
 def test_presets_of_several_studies_are_all_built() -> None:
