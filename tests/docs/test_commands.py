@@ -129,7 +129,7 @@ def test_what_jobs_ask_for_on_a_cluster_is_what_their_rules_say() -> None:
         if (found := re.search(r"mem_mb=(\d+),\n\s*runtime=(\d+),", body))
     }
     page = text("docs/cluster.md")
-    told = {}
+    told: dict[str, tuple[int, int]] = {}
     for names, memory, times in re.findall(
         r"^\| (`.*?) \| (\d+) GB \| (.*?) \|", page, re.MULTILINE
     ):
