@@ -286,7 +286,7 @@ class ListedNetwork(_WithNetwork):
         except UserError as error:
             raise fault(error.what, str(error.remedy), "file") from error
         except ValueError as error:
-            remedy = "end every ligament at a corner of a unit"
+            remedy = "list every unit once, and once every ligament from corner to corner of two"
             raise fault(str(error), remedy, "file") from error
         return made
 
