@@ -127,9 +127,21 @@ def check_problems(words: Collection[str]) -> None:
             check_calibrations()
         for study in asked_for(words) or studies()[:1]:
             check_names(study)
-            problem_of(study)
+            _check_constants(study)
     except UserError as error:
         sys.exit(f"error: {error}")
+
+
+def _check_constants(study: Study) -> None:
+    """Reads the problem of a study, and the measured constants that it names."""
+    problem = problem_of(study)
+    if problem.report.measured_constants is None:
+        return
+    try:
+        over_measured_constants(problem, WORK / "experiments" / study.name)
+    except UserError as error:
+        error.key = error.key or "report.measured_constants.file"
+        raise
 
 
 def check_room(folder: str) -> None:

@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+import yaml
 
 from pipeline.workflow.rule_inputs import check_room, products
 from tests.tables import some
@@ -121,6 +122,23 @@ def test_faulty_problem_is_one_message_even_if_results_exist(built: Sandbox) -> 
         assert "experiments/fig2/problem.yaml, line" in ended.stderr
         assert "material.axial_stiffness" in ended.stderr
         assert "Traceback" not in ended.stderr
+
+
+def test_measured_constants_are_read_before_anything_runs(sandbox: Sandbox) -> None:
+    asked = yaml.safe_load(sandbox.problem.read_bytes())["report"]["measured_constants"]["file"]
+    constants = sandbox.problem.parent / asked
+    text = constants.read_text()
+    constants.write_text(text.replace("axial_stiffness", "axial"))
+    ended = sandbox.run("--dry-run", "fig2")
+    assert ended.returncode == 1
+    assert "error: columns are missing" in ended.stderr
+    assert "key:    report.measured_constants.file" in ended.stderr
+    assert "Exception" not in ended.stderr
+    constants.unlink()
+    ended = sandbox.run("--dry-run", "fig2@quick", "fig2")
+    assert ended.returncode == 1
+    assert "error: no such file" in ended.stderr
+    assert sandbox.run("--dry-run", "fig2@as_built").returncode == 0
 
 
 @pytest.mark.parametrize("name", some(["$(touch pwned)", "a; touch pwned", "my-cloak"], 1))
