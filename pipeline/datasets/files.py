@@ -12,14 +12,12 @@ import xarray as xr
 from pipeline.datasets import seal
 from pipeline.datasets.tables import SCHEMA_VERSION, SCHEMAS, TABLES, Kind, Variable
 from pipeline.datasets.validation import MIGRATED, find_faults, migrate
-from pipeline.runtime import UserError, write_atomically
+from pipeline.runtime import UNREADABLE, UserError, write_atomically
 
 _CHUNK = bytes(1 << 20)
 _MOST = 1100
 """Bytes of data in a byte of a file: deflate makes nothing smaller than by 1032."""
 _REMEDY = "delete it and run the stage that makes it again"
-_UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, LookupError, AttributeError)
-"""What xarray and its libraries raise for files that are not as they should be."""
 
 Loaded = TypeVar("Loaded")
 
@@ -105,7 +103,7 @@ def _opened(path: Path, load: Callable[[Path], Loaded]) -> tuple[seal.State, Loa
         raise UserError("no such dataset", file=path, remedy=remedy) from error
     except PermissionError as error:
         raise UserError("no permission to read it", file=path, remedy="check its mode") from error
-    except _UNREADABLE as error:
+    except UNREADABLE as error:
         raise UserError("not a readable netCDF file", file=path, remedy=remedy) from error
 
 

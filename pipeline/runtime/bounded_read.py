@@ -4,6 +4,9 @@ import errno
 import stat
 from pathlib import Path
 
+UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, LookupError, AttributeError)
+"""What xarray and its libraries raise for files that are not as they should be."""
+
 
 def read_bounded(path: Path, most: int) -> bytes:
     """Reads the bytes of a file that has at most so many.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from pipeline.problem.fields import csv_columns
-from pipeline.runtime import UserError
+from pipeline.runtime import UNREADABLE, UserError
 
 if TYPE_CHECKING:
     from ezdxf.entities.lwpolyline import LWPolyline
@@ -116,7 +116,7 @@ def _of_netcdf(path: Path) -> NetworkContent:
             unit = data["ligament_unit"].transpose("ligament", "end").to_numpy()
             corner = data["ligament_vertex"].transpose("ligament", "end").to_numpy()
             ends = vertices[unit, corner]
-    except (OSError, ValueError, TypeError, KeyError, IndexError) as error:
+    except UNREADABLE as error:
         raise UserError(f"not a readable lattice: {error}", remedy=remedy) from error
     polygons = (corners[~np.isnan(corners).any(axis=1)] for corners in vertices)
     present = ends[~np.isnan(ends).any(axis=(1, 2))]

@@ -156,6 +156,21 @@ def test_corners_that_are_words_are_told(tmp_path: Path) -> None:
         load(from_file(tmp_path, "x.nc"))
 
 
+def test_a_damaged_dataset_is_told(tmp_path: Path) -> None:
+    """HDF5 tells of a checksum that is wrong by another error than of a file that is none."""
+    path = tmp_path / "x.nc"
+    as_netcdf(path, SQUARES)
+    data = xr.load_dataset(path)
+    corners = data["vertices"]
+    checked = {"fletcher32": True, "chunksizes": corners.shape}
+    data.to_netcdf(path, encoding={"vertices": checked})
+    whole, first = path.read_bytes(), corners.values[0].tobytes()
+    assert first in whole
+    path.write_bytes(whole.replace(first, first[::-1]))
+    with refused("not a readable lattice"):
+        load(from_file(tmp_path, "x.nc"))
+
+
 @cases("problem", "name, content, what")
 def test_a_bad_list_is_told(tmp_path: Path, name: str, content: str | None, what: str) -> None:
     if content is not None:
