@@ -11,6 +11,7 @@ from .quantities import Damping as Damping
 from .quantities import Delay as Delay
 from .quantities import Density as Density
 from .quantities import Duration as Duration
+from .quantities import Finite as Finite
 from .quantities import Force as Force
 from .quantities import Frequency as Frequency
 from .quantities import Gap as Gap

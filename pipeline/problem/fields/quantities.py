@@ -78,6 +78,7 @@ Damping = Annotated[float, _reader(units.DAMPING, 0.0, False), _schema(units.DAM
 RotaryDamping = Annotated[
     float, _reader(units.ROTARY_DAMPING, 0.0, False), _schema(units.ROTARY_DAMPING)
 ]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Ratio = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 MOST = 1_000_000

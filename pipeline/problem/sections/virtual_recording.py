@@ -8,6 +8,7 @@ from pipeline.problem.fields import (
     Angle,
     Delay,
     Duration,
+    Finite,
     Frequency,
     Gap,
     Length,
@@ -39,7 +40,7 @@ class CameraView(Section):
     distance: Length = 1000.0
     tilt: tuple[Angle, Angle] = (0.0, 0.0)
     roll: Angle = 0.0
-    distortion: tuple[float, float] = (0.0, 0.0)
+    distortion: tuple[Finite, Finite] = (0.0, 0.0)
 
 
 class Speckle(Section):
@@ -89,7 +90,7 @@ class Lighting(Section):
     """
 
     level: Shade = 0.9
-    slope: tuple[float, float] = (0.05, -0.03)
+    slope: tuple[Finite, Finite] = (0.05, -0.03)
     falloff: Shade = 0.1
     flicker: Shade = 0.0
 
@@ -159,4 +160,4 @@ class VirtualRecording(Section):
     sensor: Sensor = Sensor()
     codec: Codec = Codec()
     load_cell: VirtualLoadCell | None = None
-    seed: int = 0
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0

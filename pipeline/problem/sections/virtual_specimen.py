@@ -4,7 +4,16 @@ from typing import Annotated
 
 from pydantic import Field
 
-from pipeline.problem.fields import Angle, Coordinate, Delay, Force, Frequency, Positive, Section
+from pipeline.problem.fields import (
+    Angle,
+    Coordinate,
+    Delay,
+    Finite,
+    Force,
+    Frequency,
+    Positive,
+    Section,
+)
 from pipeline.problem.sections.prediction import Tolerances
 
 
@@ -23,7 +32,7 @@ class DriveFaults(Section):
 
     gain: Positive = 1.0
     turn: Angle = 0.0
-    cross: float = 0.0
+    cross: Finite = 0.0
     tilt: Angle = 0.0
     drift: tuple[Coordinate, Coordinate] = (0.0, 0.0)
     delay: Delay = 0.0

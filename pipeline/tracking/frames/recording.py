@@ -10,6 +10,7 @@ from pipeline.problem.fields import (
     Angle,
     Delay,
     Duration,
+    Finite,
     Frequency,
     Gap,
     Length,
@@ -53,7 +54,7 @@ class LoadCellLog(Section):
     file: str = Field(min_length=1)
     time: str = "time"
     force: str = "force"
-    offset: float = 0.0
+    offset: Finite = 0.0
 
 
 class Recording(Section):

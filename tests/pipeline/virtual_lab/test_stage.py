@@ -8,12 +8,12 @@ import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from pipeline.tracking.frames import load_cell
+from pipeline.tracking.frames import load_cell, load_recording
 from pipeline.tracking.frames.recording import LoadCellLog
 from pipeline.virtual_lab.filming import VirtualFilm
 from tests.pipeline.conftest import Failing
 from tests.pipeline.virtual_lab.conftest import SETUP
-from tests.tables import cases
+from tests.tables import cases, refused
 
 
 def recording(folder: Path, **changes: object) -> Path:
@@ -101,6 +101,16 @@ def test_what_cannot_be_filmed_is_refused(
     out = tmp_path / "out/run.mp4"
     assert told in failing("film", words(files, recording(tmp_path, **change), out))
     assert not out.parent.exists()
+
+
+@cases("virtual_lab", "text, key, told")
+def test_a_number_that_none_can_have_is_refused(
+    text: str, key: str, told: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "virtual.yaml"
+    path.write_text(text, encoding="utf-8")
+    with refused(told, key, file=path):
+        load_recording(path)
 
 
 def test_a_plan_tells_what_to_expect(files: Path, tmp_path: Path) -> None:
