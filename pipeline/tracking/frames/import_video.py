@@ -1,12 +1,13 @@
 """Converts YAML descriptions of test videos to a recording and a design dataset."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 import xarray as xr
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from pipeline.problem.fields import fault
 from pipeline.problem.reading import explain_error, yaml_file
 from pipeline.runtime import UserError
 from pipeline.tracking.frames.video import rendered
@@ -28,6 +29,16 @@ class _Described(BaseModel):
     bias_angle_deg: Annotated[float, Field(gt=-45.0, lt=45.0)]
     approx_px_per_mm: Annotated[float, Field(gt=0.0)] | None = None
     fps: Annotated[float, Field(gt=0.0)] | None = None
+
+    @model_validator(mode="after")
+    def _has_units_and_ligaments(self) -> Self:
+        if self.grid == [1, 1]:
+            raise fault("a single unit has no ligaments", "give columns and rows of units", "grid")
+        gap, spacing = self.ligament_gap_mm, self.spacing_mm
+        if gap >= spacing:
+            what = f"no unit is left between gaps of {gap:g} mm, {spacing:g} mm apart"
+            raise fault(what, "keep the gap below `spacing_mm`", "ligament_gap_mm")
+        return self
 
 
 VIDEOS = (".mp4", ".mkv", ".avi", ".mov")

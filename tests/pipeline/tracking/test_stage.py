@@ -3,6 +3,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
@@ -112,6 +113,19 @@ def test_a_turned_lattice_is_as_told(recording: Path, capsys: pytest.CaptureFixt
     np.testing.assert_allclose(turned_by_half[:, ::-1, :2], -upright[..., :2], atol=0.01)
     assert np.isnan(made[1]["load_force"]).all()
     assert "do not overlap: the track is kept" in capsys.readouterr().err
+
+
+@cases("tracking", "changes, key, what")
+def test_a_grid_without_sense_is_refused(
+    changes: dict[str, object], key: str, what: str, tmp_path: Path, failing: Failing
+) -> None:
+    content = yaml.safe_load((CLIPS / "f_silhouette.yaml").read_bytes())
+    path = tmp_path / "run.yaml"
+    path.write_text(yaml.safe_dump(content | changes), encoding="utf-8")
+    words = failing("track", ["import", str(path), "--video", VIDEO, "--out-dir", str(tmp_path)])
+    assert what in words
+    assert f"key:    {key}\n" in words
+    assert str(path) in words
 
 
 @cases("tracking", "old, new, told")
