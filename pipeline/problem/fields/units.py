@@ -120,7 +120,7 @@ def _factor(unit: str, dimension: Dimension, wanted: str) -> float:
     registry = _registry()
     try:
         given = registry.Quantity(1.0, registry.parse_units(unit))
-    except UndefinedUnitError as error:
+    except (UndefinedUnitError, KeyError, ValueError) as error:  # a zeroth power, a number
         raise UserError(f"unknown unit {unit!r}", remedy=wanted) from error
     for accepted in (dimension.unit, *dimension.also):
         if given.is_compatible_with(accepted):
