@@ -77,8 +77,8 @@ def read_columns(
     """Reads the named columns (lines, names); lines with gaps are left out.
 
     Lines above the heading are comments. Where the dimensions of columns are given, and the heading
-    (as `NAME (UNIT)`, `NAME / UNIT` or `NAME_UNIT`) or the line below it (in brackets) has units,
-    numbers are converted to working units; else they are in these.
+    (as `NAME (UNIT)`, `NAME / UNIT` or `NAME_UNIT`) or the line below it has units, numbers are
+    converted to working units; else they are in these.
 
     Raises:
         UserError: no such file, no such column, a unit of another dimension, or no numbers in them.
@@ -91,8 +91,10 @@ def read_columns(
     heading, named = _heading(cells.rows, names, path)
     factors: Floats = np.ones(len(names))
     for place, (name, dimension) in enumerate(zip(names, dimensions, strict=False)):
-        title = cells.rows[heading - 1][named[name]]
-        if (unit := _told_unit(title, dimension)) is not None:
+        column = [
+            row[named[name]] for row in cells.rows[heading - 1 :][:2] if len(row) > named[name]
+        ]
+        if (unit := _told_unit(column, dimension)) is not None:
             factors[place] = _factor(unit, dimension, name, path)
     found = [[cells.number(row, named[name]) for name in names] for row in cells.rows[heading:]]
     kept = np.array([values for values in found if None not in values], float)
@@ -177,12 +179,17 @@ def _unit(title: str) -> str | None:
     return match and match["unit"]
 
 
-def _told_unit(title: str, dimension: units.Dimension) -> str | None:
-    """Reads the unit in a title; the last word is one if it fits there or can be nothing else."""
+def _told_unit(column: list[str], dimension: units.Dimension) -> str | None:
+    """Reads the unit in a column's title, or in the cell below it.
+
+    A word behind the name, or below it, is one if it fits there or can be nothing else.
+    """
+    title, *below = column
     if (unit := _unit(title)) is not None:
         return unit
     match = _ENDING.fullmatch(title)
-    return match["unit"] if match and _is_unit(match["unit"], dimension) else None
+    words = [match["unit"], *below] if match else below
+    return next((word for word in words if _is_unit(word, dimension)), None)
 
 
 def _is_unit(word: str, dimension: units.Dimension) -> bool:

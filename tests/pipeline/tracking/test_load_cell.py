@@ -46,12 +46,15 @@ def test_units_of_a_log_are_those_of_its_heading(tmp_path: Path) -> None:
     for text in (
         "Time (ms),Load (kN)\n100,0.02\n200,0.04\n",
         "Time,Load\n(ms),(kN)\n100,0.02\n200,0.04\n",
+        "Time,Load\nms,kN\n100,0.02\n200,0.04\n",
     ):
         found = load_cell.read(log(tmp_path, text), cell)
         np.testing.assert_allclose(found.clock, plain.clock)
         np.testing.assert_allclose(found.force, plain.force)
     with refused("is not that of a force", "Load"):
         load_cell.read(log(tmp_path, "Time (s),Load (mm)\n0.1,20\n"), cell)
+    with refused("unknown unit 'lbf'", "Load"):
+        load_cell.read(log(tmp_path, "Time,Load\ns,lbf\n0.1,20\n"), cell)
 
 
 @cases("tracking", "time, force")
