@@ -19,6 +19,7 @@ from pipeline.problem.sections import design_name, group_count, split_name
 from pipeline.problem.sections import designs as designs_section
 from pipeline.runtime import RUN_MARK, WORK, UserError
 from pipeline.workflow import study_lock
+from pipeline.workflow.product_checks import check_products, presets_in_ranges, robust_presets
 from pipeline.workflow.recordings import recording_pages, shown_recordings
 from pipeline.workflow.studies import (
     Study,
@@ -26,7 +27,6 @@ from pipeline.workflow.studies import (
     check_calibrations,
     check_names,
     check_targets,
-    families,
     problem_of,
     studies,
     targets,
@@ -128,6 +128,7 @@ def check_problems(words: Collection[str]) -> None:
         for study in asked_for(words) or studies()[:1]:
             check_names(study)
             _check_constants(study)
+        check_products(words)
     except UserError as error:
         sys.exit(f"error: {error}")
 
@@ -212,35 +213,23 @@ def own_design(wildcards: Wildcards) -> list[str]:
 
 def robust_designs(wildcards: Wildcards) -> dict[str, str]:
     """Lists the study's own design ("plain") and those of its presets that ask for more."""
-    own = problem_of(Study(wildcards.name))
-    mine = [study for study in studies() if study.name == wildcards.name and study.preset]
-    held = [study for study in mine if problem_of(study).asks_more_than(own)]
+    held = robust_presets(wildcards.name)
     named = {study.preset: f"results/{study}/design.nc" for study in held}
     return {"plain": f"results/{wildcards.name}/design.nc", **named}
 
 
 def front_designs(wildcards: Wildcards) -> dict[str, str]:
     """Lists the designs of presets that ask for several under loads in ranges."""
-    members = [each for group in _in_ranges(wildcards.name).values() for each in group]
+    members = [each for group in presets_in_ranges(wildcards.name).values() for each in group]
     return {each.preset: f"results/{each}/design.nc" for each in members}
 
 
 def front_certificates(wildcards: Wildcards) -> list[str]:
     """Lists the certificates of the ends of a front: of the first and the last share of it."""
-    groups = _in_ranges(wildcards.name).items()
+    groups = presets_in_ranges(wildcards.name).items()
     share = designs_section.SHARE
     fronts = [group for study, group in groups if share in (problem_of(study).designs or {})]
     return [f"results/{group[k]}/certificate.nc" for group in fronts for k in (0, -1)]
-
-
-def _in_ranges(name: str) -> dict[Study, list[Study]]:
-    """Lists the presets of a study that ask for several designs under loads in ranges."""
-    several = {study: group for study, group in families().items() if group and study.preset}
-    return {
-        study: group
-        for study, group in several.items()
-        if study.name == name and problem_of(group[0]).objective.loads is not None
-    }
 
 
 def chunks(wildcards: Wildcards, most: int) -> list[str]:

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from pipeline.workflow.product_checks import check_products
 from pipeline.workflow.rule_inputs import check_room, products
-from tests.tables import some
+from tests.tables import cases, refused, some
 from tests.workflow.conftest import Sandbox
 
 STUDY = {"design": 2, "select": 1, "simulate": 1, "as_built": 1, "sweep": 4, "sweep_gather": 1}
@@ -55,6 +56,31 @@ def test_products_have_rules_where_they_are_asked_for() -> None:
     assert {"fig2_sweep", "fig3@quick.2_fabrication", "fig6_recordings", "fig7_front"} <= set(
         listed
     )
+
+
+@cases("workflow", "target, place, key, what, remedy")
+def test_a_product_that_is_not_asked_for_is_refused_at_once(
+    target: str, place: str, key: str | None, what: str, remedy: str
+) -> None:
+    with refused(what, key, remedy) as caught:
+        check_products(["--dry-run", target])
+    assert caught.value.file == f"experiments/{place}"
+
+
+@pytest.mark.parametrize(
+    "target",
+    ["fig2_sweep", "fig7_spectrum", "fig2@unbiased_certificate", "fig2_gains", "fig2_front",
+     "fig4@quick_recordings", "kagome_fabrication", "results/fig2/sweep.nc", "fig9_sweep"],
+)  # fmt: skip
+def test_products_that_are_asked_for_are_left_alone(target: str) -> None:
+    check_products([target])
+
+
+def test_a_product_is_refused_before_the_first_job(sandbox: Sandbox) -> None:
+    ended = sandbox.run("kagome_sweep")
+    assert ended.returncode == 1
+    assert "error: the study asks for no sweep\n" in ended.stderr
+    assert not (sandbox.root / "results").exists()
 
 
 def test_datasets_and_designs_are_those_that_the_problem_asks_for(sandbox: Sandbox) -> None:
