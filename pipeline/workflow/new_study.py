@@ -12,6 +12,7 @@ from textwrap import indent
 from pipeline import problem
 from pipeline.problem.outlines import read_outlines
 from pipeline.runtime import BUILD, UserError, found_in, write_folder_atomically
+from pipeline.workflow.studies import check_new
 
 LOG = logging.getLogger(__name__)
 
@@ -79,6 +80,7 @@ def _check(args: argparse.Namespace, folder: Path) -> None:
     if folder.exists():
         remedy = "choose another name, or edit the problem file there"
         raise UserError("there is a study of this name", file=folder, remedy=remedy)
+    check_new(args.name, args.folder.resolve().parent)
     if args.image is None:
         return
     if args.kind == "dynamic":

@@ -46,6 +46,11 @@ class Study:
         return (str(self), f"{self.name}_{self.preset}") if self.preset else (self.name,)
 
     @property
+    def all_targets(self) -> list[str]:
+        """Lists these names, and those of its products."""
+        return [f"{name}{end}" for name in self.targets for end in ("", *PRODUCTS)]
+
+    @property
     def problem(self) -> str:
         """Gives the path of the problem file, from the folder of the work."""
         return f"experiments/{self.name}/problem.yaml"
@@ -185,11 +190,10 @@ def check_targets(root: Path = WORK) -> None:
     Raises:
         UserError: of all of them, the first with its file, key and remedy.
     """
-    owners = dict.fromkeys(_rule_names(), "a rule of the workflow")
-    named = [*studies(root), *(Study.parse(name) for name in joints(root))]
+    owners = _reserved()
     faults = []
-    for study in sorted(named, key=lambda each: (each.preset, each.name)):
-        for target in [f"{name}{end}" for name in study.targets for end in ("", *PRODUCTS)]:
+    for study in sorted(_all_named(root), key=lambda each: (each.preset, each.name)):
+        for target in study.all_targets:
             if owners.setdefault(target, f"the study {study}") != f"the study {study}":
                 faults.append((study, target, owners[target]))
                 break
@@ -208,10 +212,43 @@ def check_targets(root: Path = WORK) -> None:
     )
 
 
+def check_new(name: str, root: Path = WORK) -> None:
+    """Refuses a name for a new study whose targets, with a preset `quick`, others have.
+
+    Raises:
+        UserError: naming one of these targets and what it builds.
+    """
+    owners = _reserved()
+    for study in _all_named(root):
+        owners |= dict.fromkeys(study.all_targets, f"the study {study}")
+    for target in (*Study(name).all_targets, *Study(name, "quick").all_targets):
+        if target in owners:
+            what = f"the target {target} is that of {owners[target]}"
+            raise UserError(what, key="name", value=name, remedy="choose another name")
+
+
+def _all_named(root: Path) -> list[Study]:
+    return [*studies(root), *(Study.parse(name) for name in joints(root))]
+
+
 def _definition(study: Study, root: Path) -> Path:
     """Finds the file that a study, or a figure of several, is described in."""
     path = root / study.problem
     return (path if path.exists() else path.with_name("figure.yaml")).relative_to(root)
+
+
+def _reserved() -> dict[str, str]:
+    """Maps names that no study can have to what has them."""
+    rules = dict.fromkeys(_rule_names(), "a rule of the workflow")
+    return dict.fromkeys(_make_targets(), "a command of make") | rules
+
+
+@cache
+def _make_targets() -> tuple[str, ...]:
+    """Lists what make does besides building studies; nothing in an installed package."""
+    path = ROOT / "Makefile"
+    text = path.read_text() if path.is_file() else ""
+    return tuple(" ".join(re.findall(r"^\.PHONY:([^$\n]*)", text, re.MULTILINE)).split())
 
 
 @cache

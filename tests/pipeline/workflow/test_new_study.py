@@ -7,6 +7,7 @@ from PIL import Image, ImageDraw
 from pipeline.__main__ import run_stage
 from pipeline.problem import void_units
 from pipeline.problem.reading import load
+from pipeline.workflow.studies import families
 from tests.pipeline.conftest import Failing
 
 CAT = Path(__file__).parents[3] / "experiments/shapes/cat.png"
@@ -52,6 +53,12 @@ def test_a_coloured_logo_becomes_a_void(tmp_path: Path, capsys: pytest.CaptureFi
     [
         (["2fast"], "not a name for a study"),
         (["taken"], "there is a study of this name"),
+        (["all"], "the target all is that of a rule of the workflow"),
+        (["fig1"], "the target fig1 is that of a rule of the workflow"),
+        (["report"], "value:  'report'"),
+        (["movies"], "remedy: choose another name"),
+        (["test"], "the target test is that of a command of make"),
+        (["docs"], "the target docs is that of a command of make"),
         (["x", "--image", "none.png"], "the image cannot be read"),
         (["x", "--image", str(CAT), "--threshold", "7"], f"file:   {CAT}"),
         (["x", "--image", str(CAT), "--kind", "dynamic"], "the dynamic template has no void"),
@@ -63,3 +70,17 @@ def test_a_mistake_makes_nothing(
     (tmp_path / "taken").mkdir()
     assert told in failing("new", [*words, "--folder", str(tmp_path)])
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
+@pytest.mark.parametrize("name", ["mine_quick", "mine_sweep", "mine_quick_front", "mine_2"])
+def test_a_study_called_like_a_preset_or_product_is_refused(
+    name: str, tmp_path: Path, failing: Failing
+) -> None:
+    folder = tmp_path / "experiments"
+    assert run_stage("new", ["mine", "--folder", str(folder)]) == 0
+    (folder / "mine_2_quick").mkdir()
+    shutil.copy(folder / "mine/problem.yaml", folder / "mine_2_quick")
+    families.cache_clear()
+    told = failing("new", [name, "--folder", str(folder)])
+    assert "is that of the study mine" in told
+    assert "choose another name" in told

@@ -52,6 +52,12 @@ def test_a_study_called_like_a_target_or_a_folder(name: str, tmp_path: Path) -> 
     assert (found.file, found.remedy) == (f"experiments/{name}/problem.yaml", "rename its folder")
 
 
+@pytest.mark.parametrize("name", ["test", "docs", "setup", "any_load", "clean"])
+def test_a_study_called_like_what_make_does(name: str, tmp_path: Path) -> None:
+    study(tmp_path, name)
+    assert fault(tmp_path).remedy == "rename its folder"
+
+
 def test_all_names_are_checked_at_once(tmp_path: Path) -> None:
     """A study like a product of another, and one like a preset of it."""
     for name, preset in (("a", "b"), ("a_sweep", "c"), ("a_b", "d")):
