@@ -188,6 +188,7 @@ def assembly_steps(
         "column (from the left), a number for the row (from the bottom). The id is on the "
         "underside of a printed unit and on top of a cut one; the arrow beside it points to the "
         f"top of the plan, as does a ring at the upper end.{letters}",
+        *_kerf_step(settings),
         *_layers_step(specimen, settings),
         f"{_foil_words(settings)} Sort {pieces} shims and the spares by their length (next pages); "
         "on the sheet the first of each length tells it in mm and is a spare. Numbers and colours "
@@ -222,6 +223,17 @@ def _foil_words(settings: Fabrication) -> str:
         f"Each shim hangs in its sheet by tabs of {tabs.width:g} mm ({tabs.count} a shim): keep "
         "the sheets whole, twist out what the next row takes, and trim what stands out of an edge."
     )
+
+
+def _kerf_step(settings: Fabrication) -> list[str]:
+    """Writes the step on the two variants of each sheet; none if there is one."""
+    if not settings.laser.kerf:
+        return []
+    kerf = f"{settings.laser.kerf:g}"
+    return [
+        f"Cut either the drawings _nominal or those _kerf{kerf}, never both: the second ones make "
+        f"good a cut {kerf} mm wide, the first are for a cutter that does so itself."
+    ]
 
 
 def _layers_step(specimen: BuiltSpecimen, settings: Fabrication) -> list[str]:

@@ -107,6 +107,8 @@ def bill_rows(
         yield BillRow("ligament", str(ligament.number), 1, length=ligament.length, note=note)
     for file, parts in contents.items():
         note, count = _counted(len(parts), "part"), 1
+        if file.startswith("laser/") and settings.laser.kerf:
+            note += f"; {_variant_words(file, settings.laser.kerf)}"
         if file.startswith("laser/units_"):
             note += f"; {settings.laser_route}"
             count = settings.laser_layers if settings.laminated else 1
@@ -231,6 +233,13 @@ def _way(name: str, count: int, parts: Sequence[FlatPart], *, drawn: bool) -> Bi
     note = f"{_counted(len(lines), 'cut')} of {path / 1000.0:.2f} m, about {minutes:.1f} min"
     note += "; drawn" if drawn else "; for comparison, not drawn"
     return BillRow("foil", name, count, length=path, note=note)
+
+
+def _variant_words(file: str, kerf: float) -> str:
+    """Tells which sheets a sheet may be cut in the place of."""
+    if "_nominal" in file:
+        return f"at nominal size: cut it or the sheets of kerf{kerf:g}, not both"
+    return "kerf made good: cut it or the nominal sheets, not both"
 
 
 def _print_words(found: PrintEstimate, settings: Fabrication) -> str:

@@ -17,6 +17,7 @@ from pipeline.fabrication.papers import (
     write_manifest,
 )
 from pipeline.fabrication.papers.assembly_plan import _DIGIT, _NUMBER, OVERLAP, number_places, tiles
+from pipeline.fabrication.papers.assembly_sheet import assembly_steps
 from pipeline.fabrication.papers.pdf_paper import POINT, SIZES, room
 from pipeline.fabrication.parts import BuiltSpecimen
 from pipeline.fabrication.plates import PrintEstimate
@@ -47,7 +48,7 @@ def test_the_pages_name_every_unit_shim_and_fixture(tmp_path: Path) -> None:
     assert {"S8.25", "8.25 mm", "8.10 mm", "7", "1", "8"} <= set(shims)
     assert "Set the clamped units into their pads, grips or adapters: A1, C2." in " ".join(pages[0])
     steps = [words for words in pages[0] if words.rstrip(".").isdigit()]
-    assert steps[1:] == [f"{number}." for number in range(1, 13)]  # after the page's own
+    assert steps[1:] == [f"{number}." for number in range(1, 14)]  # after the page's own
 
 
 def test_two_kinds_of_shims_are_told_apart_by_ligament(tmp_path: Path) -> None:
@@ -83,6 +84,24 @@ def test_neighbouring_tiles_share_a_strip_and_its_middle_line() -> None:
     (mine,), (other,) = list(first.joints()), list(second.joints())
     assert mine[0] == other[0] == "x"
     assert mine[1] == pytest.approx(other[1])
+
+
+@pytest.mark.parametrize("kerf", [0.15, 0.0])
+def test_papers_tell_that_sheets_of_a_kerf_replace_nominal_ones(kerf: float) -> None:
+    laser = ASKED.laser.model_copy(update={"kerf": kerf})
+    settings, specimen = ASKED.model_copy(update={"laser": laser}), handmade.specimen()
+    names = [f"laser/comb_sheet1_{variant}.dxf" for variant in ("nominal", f"kerf{kerf:g}")]
+    contents = {name: ["COMB"] for name in (names if kerf else names[:1])}
+    rows = bill_rows(specimen, settings, DENSITY, contents, {}, 0.62)
+    notes = {row.id: row.note for row in rows if row.item == "sheet"}
+    steps = " ".join(assembly_steps(specimen, settings, []))
+    if not kerf:
+        assert notes == {names[0]: "1 part"}
+        assert "nominal" not in steps
+        return
+    assert notes[names[0]] == "1 part; at nominal size: cut it or the sheets of kerf0.15, not both"
+    assert notes[names[1]] == "1 part; kerf made good: cut it or the nominal sheets, not both"
+    assert "Cut either the drawings _nominal or those _kerf0.15" in steps
 
 
 PRINTS = {"print/plate_01.3mf": PrintEstimate(3900.0, 2000.0)}
