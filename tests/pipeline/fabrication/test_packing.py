@@ -4,7 +4,7 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from shapely import STRtree, affinity, box
+from shapely import Polygon, STRtree, affinity, box
 
 from pipeline.fabrication.fixtures import fixtures
 from pipeline.fabrication.fixtures.specimen_holders import adapter
@@ -59,7 +59,7 @@ def test_an_adapter_holds_its_unit_and_touches_no_other() -> None:
     """Seen as it is used: it is printed on its back."""
     one = handmade.specimen()
     unit = one.units[1]
-    fingers = adapter("DRIVE", unit, one, handmade.ASKED).layers[-1].area
+    fingers = adapter("DRIVE", unit, Polygon(), one, handmade.ASKED).layers[-1].area
     placed = affinity.scale(fingers, xfact=-1.0, origin=(0.0, 0.0))
     assert placed.area > 20.0
     others = [other.outline for other in one.units if other is not unit]

@@ -75,7 +75,9 @@ def test_units_of_a_list_are_grouped_by_where_they_are() -> None:
 INNER = ("C4", "D4", "E4")
 
 
-@pytest.mark.parametrize(("clamped", "driven"), [(("D4",), ()), (INNER, ()), ((), INNER)])
+@pytest.mark.parametrize(
+    ("clamped", "driven"), [(("D4",), ()), (INNER, ()), ((), INNER), ((), ("D3", *INNER))]
+)
 def test_inner_units_are_held_by_adapters(
     lattice: tuple[Problem, BuiltSpecimen], clamped: tuple[str, ...], driven: tuple[str, ...]
 ) -> None:
@@ -87,10 +89,14 @@ def test_inner_units_are_held_by_adapters(
     kind = "CLAMP" if clamped else "DRIVE"
     assert list(holders) == [f"{kind}-{label}" for label in clamped + driven]
     for label in clamped + driven:
-        foot = holders[f"{kind}-{label}"].layers[1].area
+        back, foot = (layer.area for layer in holders[f"{kind}-{label}"].layers[:2])
         seen = affinity.scale(foot, xfact=-1.0, origin=(0.0, 0.0))
         unit = specimen.by_label[label].outline
         assert seen.intersection(unit).area > 0.8 * unit.area
+        assert isinstance(back, Polygon)
+        assert len(back.interiors) == 1
+    backs = [part.layers[0].area for part in holders.values()]
+    assert all(one.distance(other) > 0.4 for one, other in combinations(backs, 2))
 
 
 @pytest.mark.parametrize(
