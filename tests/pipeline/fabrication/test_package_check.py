@@ -9,6 +9,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 import pytest
+import shapely
 import trimesh
 from ezdxf.filemanagement import readfile
 
@@ -113,6 +114,15 @@ def without_id(package: Path) -> None:
     write_stl(path, np.asarray(body.vertices), np.asarray(body.faces))
 
 
+def without_bolt(package: Path) -> None:
+    """A base of a clamp that is whole."""
+    path = package / "fixture/CLAMP-A1.stl"
+    base = read_stl(path).section(3.0)
+    whole = shapely.Polygon(shapely.get_exterior_ring(base))
+    body = trimesh.creation.extrude_polygon(whole, 4.0, engine="earcut")
+    write_stl(path, np.asarray(body.vertices), np.asarray(body.faces))
+
+
 def halved(name: str, kept: float = 0.5) -> Callable[[Path], None]:
     def damage(package: Path) -> None:
         content = (package / name).read_bytes()
@@ -159,7 +169,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
         "part DRIVE-B1: it stands in the way of CLAMP-A1",
     ),
     "clamp without a bolt": (
-        copied("fixture/JIG1.stl", "fixture/CLAMP-A1.stl"),
+        without_bolt,
         "part CLAMP-A1: it has no hole of 4.2 mm for a bolt",
     ),
     "another letter": (
