@@ -6,6 +6,7 @@ from .atomic_write import sidecar_path as sidecar_path
 from .atomic_write import write_atomically as write_atomically
 from .atomic_write import write_folder_atomically as write_folder_atomically
 from .bounded_read import UNREADABLE as UNREADABLE
+from .bounded_read import check_size as check_size
 from .bounded_read import read_bounded as read_bounded
 from .case_log import CaseLog as CaseLog
 from .case_log import SweepResult as SweepResult

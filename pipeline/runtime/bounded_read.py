@@ -14,10 +14,19 @@ def read_bounded(path: Path, most: int) -> bytes:
     Raises:
         OSError: it cannot be read, is larger, or is a device or a pipe, which need not end.
     """
+    check_size(path, most)
+    return path.read_bytes()
+
+
+def check_size(path: Path, most: int) -> None:
+    """Refuses a file of more than so many bytes.
+
+    Raises:
+        OSError: it is not there, is larger, or is a device or a pipe, which need not end.
+    """
     entry = path.stat()
     if not (stat.S_ISREG(entry.st_mode) or stat.S_ISDIR(entry.st_mode)):
         raise OSError(errno.EINVAL, "not a plain file", str(path))
     if entry.st_size > most:
         what = f"{entry.st_size} bytes, which is more than {most}"
         raise OSError(errno.EINVAL, what, str(path))
-    return path.read_bytes()

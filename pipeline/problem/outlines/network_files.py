@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from pipeline.problem.fields import csv_columns
-from pipeline.runtime import UNREADABLE, UserError
+from pipeline.runtime import UNREADABLE, UserError, check_size
 
 if TYPE_CHECKING:
     from ezdxf.entities.lwpolyline import LWPolyline
@@ -23,6 +23,9 @@ STIFFNESS_COLUMNS = ("axial (N/mm)", "shear (N/mm)", "bending (N mm/rad)")
 """Further columns, some or all: of ligaments, in either of their rows or in both."""
 
 Stiffness: TypeAlias = tuple[float | None, float | None, float | None]
+
+LARGEST_FILE = 64 << 20  # bytes
+_SMALLER = "give a smaller lattice, or the same one in a file of another kind"
 
 
 class NetworkContent(NamedTuple):
@@ -50,6 +53,10 @@ def read_network(path: Path) -> NetworkContent:
         )
     if not path.is_file():
         raise UserError("no such file", remedy="give its path as seen from the problem file")
+    try:
+        check_size(path, LARGEST_FILE)
+    except OSError as error:
+        raise UserError(f"the lattice is not read: {error.strerror}", remedy=_SMALLER) from error
     found = reader(path)
     if not found.polygons or not found.ligaments:
         missing = "ligaments" if found.polygons else "units"

@@ -180,6 +180,14 @@ def test_a_bad_list_is_told(tmp_path: Path, name: str, content: str | None, what
     assert caught.value.value == name
 
 
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_a_lattice_of_too_many_bytes_is_not_read(suffix: str, tmp_path: Path) -> None:
+    with (tmp_path / f"x.{suffix}").open("wb") as content:
+        content.truncate((64 << 20) + 1)
+    with refused("67108865 bytes, which is more than 67108864", "lattice.file"):
+        load(from_file(tmp_path, f"x.{suffix}"))
+
+
 @cases("problem", "rows, what")
 def test_bad_ligaments_are_told(tmp_path: Path, rows: str, what: str) -> None:
     as_csv(tmp_path / "x.csv", SQUARES)
