@@ -39,11 +39,13 @@ def of(*programs: str) -> list[Command]:
 
 @pytest.fixture(scope="module")
 def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
-    """The repository with the study that the tutorials make."""
+    """The repository with the study that the tutorials make, and a recording of it."""
     made = Checkout.made(tmp_path_factory.mktemp("docs") / "checkout")
     shutil.rmtree(made.root / "experiments/logo", ignore_errors=True)
     assert run_stage("new", ["logo", "--folder", str(made.root / "experiments"), "--quiet"]) == 0
-    (made.root / "experiments/logo/recordings").mkdir()
+    recording = made.root / "experiments/logo/recordings/run1.yaml"
+    recording.parent.mkdir()
+    recording.write_text("structure: cloaked\nvirtual: {}\n", encoding="utf-8")
     return made
 
 
