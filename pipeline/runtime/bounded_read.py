@@ -5,7 +5,7 @@ import stat
 from pathlib import Path
 
 UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, LookupError, AttributeError)
-"""What xarray and its libraries raise for files that are not as they should be."""
+"""Errors that xarray and its libraries raise for files that are not as they should be."""
 
 
 def read_bounded(path: Path, most: int) -> bytes:

@@ -121,7 +121,7 @@ def test_copies_are_measured_like_the_structure(shield: StudyResults, smile: Stu
 def test_units_that_were_lost_do_not_count(
     smile: StudyResults, of: Callable[..., xr.DataArray]
 ) -> None:
-    """Where all units miss the target by as much, it is the same whichever are seen."""
+    """Loses half of the units, which all miss the target by as much."""
     apart = smile.response.copy(deep=True)
     apart["displacement"][:] = 1.0
     apart["displacement"].loc[{"structure": "cloaked"}] = 3.0

@@ -73,7 +73,7 @@ def test_every_snap_between_two_loads_is_recorded() -> None:
 
 @pytest.mark.parametrize("short", np.arange(1, 20) * 1e-9)
 def test_a_load_just_before_a_snap_is_reached(short: float) -> None:
-    """However little of the way increments leave."""
+    """Leaves increments hardly any of the way."""
     rig, values = crumpled(31)
     first = StaticSolver(rig.topology, np.ones(1)).forward(values, rig.drive)[2].snaps[0]
     times = np.array([first - short, 1.0])
