@@ -5,8 +5,8 @@ from .arc_length import trace as trace
 from .arc_length import trace_first_snap as trace_first_snap
 from .eigenvalue import eigenvalue_and_slopes as eigenvalue_and_slopes
 from .eigenvalue import lowest_eigenpair as lowest_eigenpair
-from .equilibrium_path import BRANCHING as BRANCHING
-from .equilibrium_path import LIMIT_POINT as LIMIT_POINT
+from .path_ends import BRANCHING as BRANCHING
+from .path_ends import LIMIT_POINT as LIMIT_POINT
 from .softness import SoftestPoint as SoftestPoint
 from .softness import softest_point as softest_point
 from .static_solver import StaticRecord as StaticRecord

@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, NewContactPairs
 from sim.energy import System, Topology, gradient, hessian_product, locate, system_of, workspace
-from sim.quasistatics.equilibrium_path import BRANCHING
+from sim.quasistatics.path_ends import BRANCHING
 from sim.quasistatics.static_solver import StaticRecord, StaticSolver
 from sim.solvers import PrescribedMotion
 from sim.structure import ConcreteParameters

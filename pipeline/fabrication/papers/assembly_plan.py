@@ -289,11 +289,17 @@ def number_places(
         corners = np.column_stack([spots - half, spots + half])
         over, under = tree.query(shapely.box(*corners.T), "intersects")
         crossed = np.bincount(over[owners[under] != number], minlength=len(spots))
-        cost = reach + _CROSSED * crossed + _COVERED * _covered(corners, boxes)
+        cost = reach + _CROSSED * crossed + _COVERED * _covered(corners, _near(corners, boxes))
         best = int(np.argmin(np.round(cost, 6)))
         places[number] = (float(spots[best, 0]), float(spots[best, 1]))
         boxes = np.vstack([boxes, corners[best]])
     return places
+
+
+def _near(boxes: Floats, others: Floats) -> Floats:
+    """Selects the boxes (m, 4) of others that the one around boxes (n, 4) meets."""
+    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+    return others[((others[:, :2] < high) & (others[:, 2:] > low)).all(axis=1)]
 
 
 def _covered(boxes: Floats, others: Floats) -> Floats:
