@@ -35,7 +35,7 @@ class Answer(NamedTuple):
 
 
 def solved(case: StressScene, solver: Solver) -> Answer:
-    """Solves one case by ``sim.solvers.base.solve_case``."""
+    """Solves one case by ``sim.solvers.solve_case``."""
     return Answer(*solve_case(solver, case.values, case.drive))
 
 

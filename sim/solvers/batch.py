@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from sim.core import Floats, SimulationError
-from sim.solvers.base import PrescribedMotion, Solver, solve_case
+from sim.solvers.load_cases import solve_case
+from sim.solvers.prescribed_motion import PrescribedMotion
+from sim.solvers.solver import Solver
 from sim.structure import ConcreteParameters
 
 R = TypeVar("R")

@@ -1,0 +1,70 @@
+"""Prescribes the motion of units, or the forces on them."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from sim.core import Floats, Ints, Numbers
+from sim.energy import Topology
+from sim.solvers.loads import FORCE, MotionLaw, held_values, loaded_units
+
+
+class PrescribedMotion(NamedTuple):
+    """Prescribes the motion of units, or the forces on them; all other held dofs rest.
+
+    Attributes:
+        units: (n,) ids.
+        motion: of them, mm, mm, rad; N, N, N mm where it is a force.
+        control: (n, 3) whether each component is a DISPLACEMENT, a FORCE, or the dof is FREE; by
+            default all dofs are displaced.
+    """
+
+    units: Ints
+    motion: MotionLaw
+    control: Ints | None = None
+
+    @property
+    def loaded(self) -> Ints:
+        """(n_loaded,) units under a force, ascending."""
+        return self.units[:0] if self.control is None else loaded_units(self.units, self.control)
+
+    def forces(self, times: Floats) -> Floats:
+        """Forces (n_times, n, 3) that it puts on its units, N and N mm; zero where it puts none."""
+        shape = (len(times), len(self.units), 3)
+        if self.control is None:
+            return np.zeros(shape)
+        each = np.broadcast_to(self._at(times).reshape(len(times), -1, 3), shape)
+        return np.where(self.control == FORCE, each, 0.0)
+
+    def values(self, held: Ints, times: Floats) -> Floats:
+        """Values (n_times, n_held) of the held dofs."""
+        return np.asarray(held_values(held, self.units, self._at(times), self.control))
+
+    def _at(self, times: Floats) -> Floats:
+        """Computes the motion in NumPy, whichever arrays its numbers are."""
+        plain = jax.tree.map(
+            lambda leaf: np.asarray(leaf) if isinstance(leaf, Array) else leaf, self.motion
+        )
+        return np.asarray(plain(times))
+
+    def start(self, topology: Topology, time: float) -> Floats:
+        """State (n_dofs,) in which a motion from rest begins: the held dofs are in place."""
+        state = np.zeros(topology.n_dofs)
+        state[topology.held] = self.values(topology.held, np.array([time]))[0]
+        return state
+
+    def rates(self, held: Ints, times: Floats) -> Floats:
+        """Their rates of change, per s."""
+        # of a length that is a power of 2: JAX compiles for every new one
+        padded = np.pad(times, (0, (1 << (len(times) - 1).bit_length()) - len(times)), mode="edge")
+        rates = np.asarray(rates_of(self.motion, padded))[: len(times)]
+        return np.asarray(held_values(held, self.units, rates, self.control))
+
+
+@jax.jit
+def rates_of(motion: MotionLaw, times: Array) -> Numbers:
+    """Differentiates a law by the time: rates (n_times, n, 3), per s."""
+    return jax.jvp(motion, (times,), (jnp.ones_like(times),))[1]
