@@ -1,15 +1,27 @@
 """Draws the loss against the evaluation of the design, for every method, as a panel of a figure."""
 
+from typing import Any
+
 import matplotlib.patheffects as effects
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import Bbox
 
 from reports.base import style
 
 FEASIBLE = 1e-6
 """Violation of a constraint (mm, rad) up to which an evaluation counts as feasible."""
+
+SIDES: tuple[tuple[tuple[float, float], dict[str, Any]], ...] = (
+    ((0, -4.5), {"ha": "right", "va": "top"}),
+    ((3, 2), {"ha": "left", "va": "bottom"}),
+    ((0, -4.5), {"ha": "left", "va": "top"}),
+    ((0, 4.5), {"ha": "right", "va": "bottom"}),
+)
+"""Where a number may stand beside its mark: shifts in points, and which corner is shifted."""
 
 
 def loss_history(axes: Axes, design: xr.Dataset, label: str = r"Loss $J$") -> None:
@@ -21,6 +33,8 @@ def loss_history(axes: Axes, design: xr.Dataset, label: str = r"Loss $J$") -> No
     style.log_values(axes)
     axes.set(xlabel="Evaluation", ylabel=label, xlim=(0, None))
     axes.set_ylim(0.55 * float(design["loss"].min()), None)
+    for method in design["method"].values:
+        _name_best(axes, design.sel({"method": method}))
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), ncols=2, columnspacing=1.2)
 
@@ -40,8 +54,33 @@ def _history(axes: Axes, history: xr.Dataset, colour: str, name: str) -> None:
     axes.plot(step[outside], loss[outside], ".", color=colour, ms=2.4, mew=0, alpha=0.4, zorder=2)
     at, best = int(history["best_evaluation"]), float(history["best_loss"])
     axes.plot(at, best, "o", ms=3.6, mfc="white", mec=colour, mew=1.0, zorder=6)
-    aside = at < loss.size / 2  # where another method's curve may run below
-    side = {"ha": "left", "va": "bottom"} if aside else {"ha": "right", "va": "top"}
-    shift = (3, 2) if aside else (0, -4.5)
-    label = style.note(axes, (at, best), f"{best:.3f}", shift, color=colour, zorder=7, **side)
-    label.set_path_effects([effects.withStroke(linewidth=1.5, foreground="white")])
+
+
+def _name_best(axes: Axes, history: xr.Dataset) -> None:
+    """Writes the best loss beside its mark, on the first side that crosses the least of curves."""
+    at, best = int(history["best_evaluation"]), float(history["best_loss"])
+    colour = style.METHOD_COLOURS.get(str(history["method"].values), style.GREY)
+    written = [
+        style.note(axes, (at, best), f"{best:.3f}", shift, color=colour, zorder=7, **corner)
+        for shift, corner in SIDES
+    ]
+    crossed = [_crossed(axes, label.get_window_extent()) for label in written]
+    chosen = written[int(np.argmin(crossed))]
+    chosen.set_path_effects([effects.withStroke(linewidth=1.5, foreground="white")])
+    for label in written:
+        if label is not chosen:
+            label.remove()
+
+
+def _crossed(axes: Axes, box: Bbox) -> float:
+    """Counts what is drawn under a box in pixels; what is outside the axes is worse than any."""
+    inside = axes.bbox.padded(1.0)
+    outside = not (inside.contains(box.x0, box.y0) and inside.contains(box.x1, box.y1))
+    return 100.0 * outside + sum(_meets(line, box) for line in axes.lines)
+
+
+def _meets(line: Line2D, box: Bbox) -> bool:
+    path = line.get_transform().transform_path(line.get_path())
+    if line.get_linestyle() == "None":
+        return bool(box.count_contains(path.vertices))
+    return path.intersects_bbox(box, filled=False)

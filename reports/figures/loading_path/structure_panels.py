@@ -76,7 +76,8 @@ def rest_panel(axes: Axes, problem: Problem, response: xr.Dataset, name: str) ->
     interest = response["roi"].values * isinstance(problem.objective.region, Region)
     others = np.where(interest, INTEREST_TINT, UNIT_TINT).tolist()
     draw_clamps(axes, structure, problem.lattice.spacing)
-    draw(axes, structure, colours=tints(structure, held, altered, others), margin=12.0)
+    margin = max(12.0, 1.2 * _reach(structure))  # arrows begin before the structure
+    draw(axes, structure, colours=tints(structure, held, altered, others), margin=margin)
     if name != "intact" and problem.void is not None:
         _draw_outlines(axes, problem.void.outlines(problem.lattice.centre_site))
     for drive in single_drives(problem.drive):
@@ -106,13 +107,18 @@ def _ways(drive: SingleDrive, response: xr.Dataset, units: list[int]) -> Sequenc
     return (np.arctan2(y, x),) if np.hypot(x, y) > 0.0 else ()
 
 
+def _reach(structure: RigidUnits) -> float:
+    """Computes the length of the drive's arrows, mm."""
+    size = float(np.ptp(structure.centroid[structure.present], axis=0).max())
+    return float(max(0.055 * size, 0.8 * size / np.sqrt(structure.present.sum())))
+
+
 def _load_arrows(
     axes: Axes, structure: RigidUnits, ways: Sequence[float] | str, ends: Floats
 ) -> None:
     """Draws arrows onto some of the driven units, along ways (rad), or a sign in the units."""
     few = np.unique(np.linspace(0, len(ends) - 1, 5).round().astype(int))
-    size = float(np.ptp(structure.centroid[structure.present], axis=0).max())
-    reach = max(0.055 * size, 0.8 * size / np.sqrt(structure.present.sum()))
+    reach = _reach(structure)
     shown = ends[few[1:-1] if len(few) == 5 else few]
     if isinstance(ways, str):
         for end in shown:

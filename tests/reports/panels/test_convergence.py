@@ -1,0 +1,40 @@
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
+
+from reports.panels.convergence import loss_history
+
+
+def _history(losses: list[float]) -> xr.Dataset:
+    """Makes the design of a search that accepted every evaluation."""
+    loss = np.array(losses)
+    ones = ("method", "evaluation"), np.ones((1, loss.size))
+    return xr.Dataset(
+        {
+            "loss": (("method", "evaluation"), loss[None]),
+            "loss_case": (("method", "case", "evaluation"), loss[None, None]),
+            "accepted": ones,
+            "violation": (ones[0], np.zeros((1, loss.size))),
+            "best_loss": ("method", [loss.min()]),
+            "best_evaluation": ("method", [int(loss.argmin())]),
+        },
+        {"method": ["sqp"]},
+    )
+
+
+@pytest.mark.parametrize("best", [0, 6, 50, 99])
+def test_number_of_the_best_loss_stands_clear_of_the_curve(best: int) -> None:
+    # kicked off after the best, so that the curve passes above and to the right of it
+    losses = (0.037 + 0.04 * np.exp(-((np.arange(100) - best - 1) % 32) / 8)).tolist()
+    losses[best] = 0.0345
+    axes = Figure(figsize=(2.2, 1.8), dpi=300).add_axes((0.2, 0.2, 0.75, 0.65))
+    loss_history(axes, _history(losses))
+    (label,) = axes.texts
+    box = Bbox(label.get_window_extent().get_points())
+    drawn = [line for line in axes.lines if line.get_linestyle() != "None"]
+    paths = [line.get_transform().transform_path(line.get_path()) for line in drawn]
+    assert label.get_text() in {"0.034", "0.035"}
+    assert not any(path.intersects_bbox(box, filled=False) for path in paths)
+    assert axes.bbox.x1 >= box.x1 - 1.0
