@@ -71,9 +71,9 @@ def design_facts(design: xr.Dataset) -> Iterator[Fact]:
     yield _told("design_hash", np.nan, design_hash(design), note=note)
 
 
-def path_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
+def path_facts(problem: Problem, design: xr.Dataset, response: xr.Dataset) -> Iterator[Fact]:
     """Yields voids, gaps, overlaps, contacts, stability and shims of every structure on its way."""
-    yield from foil.strain_facts(problem, response)
+    yield from foil.strain_facts(problem, design, response)
     for name in (str(name) for name in response["structure"].values):
         part, words = response.sel(structure=name), display_name(problem, name).lower()
         void, of = float(np.degrees(part["min_void_angle"].min())), {"name": name, "words": words}

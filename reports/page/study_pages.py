@@ -173,7 +173,7 @@ def _warnings(study: StudyResults) -> list[str]:
     said = list(dict.fromkeys(text for plan in plans for text in plan.get("warnings", ())))
     lattice, cloaked = altered_lattice_of(study.problem), study.response.sel(structure="cloaked")
     soft = soft_units(study.problem, lattice, flat_vertices(lattice, cloaked["vertices"]))
-    return [*said, *foil.strain_warning(study.problem, study.response), *soft]
+    return [*said, *foil.strain_warning(study.problem, study.design, study.response), *soft]
 
 
 def sources(study: StudyResults, label: str = "") -> Iterator[Source]:

@@ -52,7 +52,9 @@ def loading_path_facts(study: StudyResults) -> list[Fact]:
         *grouped("Reaction", reaction_facts(study, path)),
         *grouped("Optimisation", checks.history_facts(study.problem, study.design)),
         *grouped("Checks of the design", checks.design_facts(study.design)),
-        *grouped("Checks along the path", checks.path_facts(study.problem, study.response)),
+        *grouped(
+            "Checks along the path", checks.path_facts(study.problem, study.design, study.response)
+        ),
         *grouped("Contact", contact_comparison.contact_facts(study)),
         *grouped("Load steps", checks.variant_facts(study.verification)),
         *grouped("Imperfect copies", copy_facts(study)),

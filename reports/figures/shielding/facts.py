@@ -64,7 +64,7 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
             constants_facts(study.problem, study.constants, mean_losses(scene, response)),
         ),
         *grouped("Checks", check_facts(design, response)),
-        *grouped("Checks", foil.strain_facts(study.problem, response)),
+        *grouped("Checks", foil.strain_facts(study.problem, design, response)),
     ]
 
 

@@ -36,7 +36,9 @@ def wave_facts(study: StudyResults) -> list[Fact]:
         *grouped("Optimisation", checks.history_facts(study.problem, study.design)),
         *grouped("Imperfect copies", copies.loss_facts(study)),
         *grouped("Checks of the design", checks.design_facts(study.design)),
-        *grouped("Checks over time", checks.path_facts(study.problem, study.response)),
+        *grouped(
+            "Checks over time", checks.path_facts(study.problem, study.design, study.response)
+        ),
     ]
 
 
