@@ -86,7 +86,8 @@ def _points(path: Path, args: argparse.Namespace) -> None:
     held = path.parent / asked.points
     table = sidecar_path(args.out, path, held, suffix=".csv")
     with found_in(path):
-        made = dic_points.track(design, dic_points.read_points(held, asked))
+        seen = dic_points.read_points(held, asked)
+        made = dic_points.track(design, seen, asked.subset)
     parents = {"design": source, "points": held}
     origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=asked.synthetic)
     datasets.write(made, args.out, "track", origin)

@@ -7,10 +7,9 @@ import numpy as np
 import shapely
 import xarray as xr
 from pydantic import Field
-from scipy.spatial import cKDTree
 
 from pipeline.datasets.tables import TABLES
-from pipeline.problem.fields import Angle, Coordinate, Section, csv_columns, units
+from pipeline.problem.fields import Angle, Coordinate, Length, Section, csv_columns, units
 from pipeline.problem.reading import load_section
 from pipeline.runtime import UserError
 from pipeline.tracking.geometry import (
@@ -19,13 +18,13 @@ from pipeline.tracking.geometry import (
     robust_motion,
     rotation_matrix,
 )
+from pipeline.tracking.output.subset_overlap import Residuals, inflate_sigma, subset_width
 from pipeline.tracking.output.track_dataset import label_track, pose_variables
-from sim.core import Floats, Ints
+from sim.core import Floats, Ints, Mask
 
 _FINEST = 1e-4  # mm, standard deviation of the best points
 _LEAST = 3  # points of a unit
-_STRAY = 4.0  # of a usual error, from which on a point counts as gone astray
-_MOST_ALIKE = 0.95  # correlation of neighbours that is told from one
+_MOST_LOOKS = 200  # of a unit at a time, that tell how far subsets overlap
 
 ColumnName = Annotated[str, Field(min_length=1)]
 
@@ -58,6 +57,8 @@ class DicExport(Section):
         origin: place of unit (0, 0)'s lattice point on the file's axes.
         rotation: of the specimen's x axis on the file's axes, counter-clockwise.
         flipped: whether the file's y axis points downwards.
+        subset: side of the system's square subsets, which tells how far they overlap; by default as
+            the points' errors tell.
         design: the design dataset, likewise; or --design.
         structure: which of the design's structures it is.
         synthetic: whether it was computed, not measured.
@@ -69,6 +70,7 @@ class DicExport(Section):
     origin: tuple[Coordinate, Coordinate] = (0.0, 0.0)
     rotation: Angle = 0.0
     flipped: bool = False
+    subset: Length | None = None
     design: ColumnName | None = None
     structure: Literal["intact", "altered", "cloaked"] = "cloaked"
     synthetic: bool = False
@@ -113,16 +115,16 @@ def read_points(path: Path, asked: DicExport) -> DicPoints:
     return DicPoints(table[:, 0], place, table[:, 3:5] * upright @ turn)
 
 
-def track(design: xr.Dataset, seen: DicPoints) -> xr.Dataset:
+def track(design: xr.Dataset, seen: DicPoints, subset: float | None = None) -> xr.Dataset:
     """Makes the dataset ``track`` of points: a robust rigid fit for each unit and time.
 
     A unit's motion is taken from the points that lie on it at rest. Its uncertainty follows from
-    how far they are from moving rigidly, and from how alike these errors are in neighbours: a DIC
-    system's subsets overlap.
+    how far they are from moving rigidly, and from how far a DIC system's subsets overlap.
 
     Args:
         design: as built.
         seen: the points.
+        subset: side of the subsets, mm; by default as neighbours' errors tell.
 
     Raises:
         UserError: hardly a unit bears points.
@@ -141,34 +143,32 @@ def track(design: xr.Dataset, seen: DicPoints) -> xr.Dataset:
     time, frame = np.unique(seen.time, return_inverse=True)
     motion = np.full((len(time), specimen.count, 3), np.nan)
     sigma = np.full_like(motion, np.nan)
-    order = np.lexsort((unit, frame))
-    order = order[unit[order] >= 0]
-    key = frame[order] * specimen.count + unit[order]
-    alike = np.zeros(2)  # sums of products of errors with those of neighbours, and of squares
-    for rows in np.split(order, np.flatnonzero(np.diff(key)) + 1):
-        if len(rows) >= _LEAST:
-            at = frame[rows[0]], unit[rows[0]]
-            before = seen.place[rows] - specimen.centre[unit[rows[0]]]
-            motion[at], sigma[at], rest = _fitted(before, before + seen.moved[rows])
-            alike += _neighbours(before, rest)
-    sigma *= np.sqrt(_points_alike(alike[0] / max(alike[1], _FINEST**2)))
+    fits = [
+        ((frame[rows[0]], unit[rows[0]]), seen.place[rows] - specimen.centre[unit[rows[0]]], rows)
+        for rows in _grouped(frame * specimen.count + unit, unit >= 0)
+    ]
+    looks, step = [], -(-len(fits) // _MOST_LOOKS)
+    for number, (at, before, rows) in enumerate(fits):
+        motion[at], sigma[at], rest = _fitted(before, before + seen.moved[rows])
+        if number % step == 0:
+            looks.append(Residuals(before, rest))
+    if subset is None:
+        widest = max(np.ptp(specimen.polygon(k), axis=0).max() for k in range(specimen.count))
+        subset = subset_width(looks, float(widest))
+    factors: dict[bytes, Floats] = {}  # points mostly stay where they are
+    for at, before, _ in fits:
+        if (place := before.tobytes()) not in factors:
+            factors[place] = inflate_sigma(before, subset)
+        sigma[at] *= factors[place]
     return _dataset(design, time - time[0], motion, sigma)
 
 
-def _neighbours(place: Floats, rest: Floats) -> Floats:
-    """Sums errors (n, 2) of points (n, 2) times those of the nearest others, and their squares."""
-    near = cKDTree(place).query(place, k=2)[1][:, 1]
-    sound = (rest**2).sum(axis=1) < _STRAY**2 * np.median((rest**2).sum(axis=1))
-    pairs = sound & sound[near]
-    return np.array([(rest[pairs] * rest[near][pairs]).sum(), (rest[pairs] ** 2).sum()])
-
-
-def _points_alike(correlation: float) -> float:
-    """Counts the points whose errors are one, of neighbours with that correlation.
-
-    Subsets m steps wide share 1 - 1 / m of their pixels with the next, and each of m^2 some.
-    """
-    return (1.0 - np.clip(correlation, 0.0, _MOST_ALIKE)) ** -2.0
+def _grouped(key: Ints, wanted: Mask) -> list[Ints]:
+    """Groups the wanted rows by their key, where these are enough to tell a pose."""
+    order = np.argsort(key, kind="stable")
+    order = order[wanted[order]]
+    groups = np.split(order, np.flatnonzero(np.diff(key[order])) + 1)
+    return [rows for rows in groups if len(rows) >= _LEAST]
 
 
 def _bearer(specimen: SpecimenOutlines, place: Floats) -> Ints:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
@@ -17,6 +18,7 @@ from tests.tables import cases
 SMALL = GRID | {"grid": [4, 4]}
 ORIGIN, ROTATION = np.array([100.0, 40.0]), np.deg2rad(30.0)
 NOISE = 0.002
+REACH = 3.0
 AXES = "origin: [100 mm, 40 mm]\nrotation: 30 deg\nflipped: true\n"
 
 
@@ -73,23 +75,43 @@ def test_points_that_do_not_fit_are_refused(
     assert told in failing("track", words)
 
 
-@pytest.mark.parametrize("overlap", [1, 3, 5])
-def test_sigma_holds_where_subsets_overlap(overlap: int) -> None:
-    """Each point is the mean of as many patches of white noise either way; its neighbours share."""
+def overlapping(overlap: int, rotation: float = 0.0) -> tuple[xr.Dataset, DicPoints]:
+    """Points of still units, each the mean of as many patches of white noise either way.
+
+    The grid is turned against the units by `-rotation`.
+    """
     design = import_video.design(SMALL)
     specimen = outlines_of_design(design)
     random, side, frames = np.random.default_rng(3), 9, 30
-    grid = np.stack(np.meshgrid(*[np.linspace(-3.0, 3.0, side)] * 2), axis=-1).reshape(-1, 2)
+    cos, sin = np.cos(rotation), np.sin(rotation)
+    grid = np.stack(np.meshgrid(*[np.linspace(-REACH, REACH, side)] * 2), axis=-1).reshape(-1, 2)
+    grid = grid @ np.array([[cos, -sin], [sin, cos]])
     place = (specimen.centre[:, None] + grid).reshape(-1, 2)
     white = random.normal(size=(frames, 16, side + overlap - 1, side + overlap - 1, 2))
     patches = np.lib.stride_tricks.sliding_window_view(white, (overlap, overlap), axis=(2, 3))
     noise = NOISE * overlap * patches.mean(axis=(-2, -1)).reshape(frames, -1, 2)
-    seen = DicPoints(
-        np.repeat(np.arange(float(frames)), len(place)),
-        np.tile(place, (frames, 1)),
-        noise.reshape(-1, 2),
-    )
-    made = track(design, seen)
-    ratio = np.sqrt(np.mean((made["displacement"].values / made["sigma"].values) ** 2, axis=(0, 1)))
-    assert (ratio > 0.6).all()
-    assert (ratio < 1.5).all()
+    times = np.repeat(np.arange(float(frames)), len(place))
+    return design, DicPoints(times, np.tile(place, (frames, 1)), noise.reshape(-1, 2))
+
+
+def ratio(made: xr.Dataset) -> np.ndarray:
+    """Errors over their sigma, root mean square, of units that do not move."""
+    return np.sqrt(np.mean((made["displacement"].values / made["sigma"].values) ** 2, axis=(0, 1)))
+
+
+@pytest.mark.parametrize("overlap", [1, 3, 7])
+def test_sigma_holds_where_subsets_overlap(overlap: int) -> None:
+    design, seen = overlapping(overlap)
+    np.testing.assert_allclose(ratio(track(design, seen)), 1.0, atol=0.2)
+
+
+@pytest.mark.parametrize("overlap", [5, 12])
+def test_sigma_holds_for_subsets_of_known_size(overlap: int) -> None:
+    design, seen = overlapping(overlap)
+    made = track(design, seen, subset=overlap * 2 * REACH / 8)
+    np.testing.assert_allclose(ratio(made), 1.0, atol=0.2)
+
+
+def test_sigma_holds_where_the_specimen_is_turned_in_the_picture() -> None:
+    design, seen = overlapping(5, ROTATION)
+    np.testing.assert_allclose(ratio(track(design, seen)), 1.0, atol=0.2)
