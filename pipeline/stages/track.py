@@ -27,7 +27,7 @@ from pipeline.tracking.frames import (
     has_uneven_intervals,
     import_video,
     load_cell,
-    quarter_turns,
+    orientation_of,
     read_frames,
     read_pictures,
     recording,
@@ -241,12 +241,14 @@ def readout_of(asked: Recording, video: Path, source: Path) -> float:
     Raises:
         UserError: the camera's rows are columns of theirs.
     """
-    turns = quarter_turns(video) if asked.readout else 0
-    if turns % 2:
+    if not asked.readout:
+        return 0.0
+    shown = orientation_of(video)
+    if shown.transposed:
         what = "the video is shown turned by a quarter, so that the camera's rows are its columns"
         remedy = "film with the phone held across, or leave readout out"
         raise UserError(what, file=source, key="readout", value=asked.readout, remedy=remedy)
-    return -asked.readout if turns else asked.readout
+    return -asked.readout if shown.rows_reversed else asked.readout
 
 
 def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) -> Track:

@@ -10,6 +10,6 @@ from .video import BrokenOffError as BrokenOffError
 from .video import Frame as Frame
 from .video import frame_count as frame_count
 from .video import has_uneven_intervals as has_uneven_intervals
-from .video import quarter_turns as quarter_turns
+from .video import orientation_of as orientation_of
 from .video import read_frames as read_frames
 from .video import rendered as rendered

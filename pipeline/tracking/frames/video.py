@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
-from typing import cast
+from typing import NamedTuple, cast
 
 import av
 import numpy as np
@@ -283,7 +283,7 @@ def _decoded(
             return
         if time >= start:
             _check_progressive(frame, path)
-            yield Frame(index, time, _upright(shades(frame), frame.rotation))
+            yield Frame(index, time, _orientation(frame).shown(shades(frame)))
         index += 1
 
 
@@ -330,29 +330,50 @@ def _duration(container: av.container.InputContainer, stream: av.VideoStream) ->
     return (container.duration - max(container.start_time or 0, 0)) / av.time_base
 
 
-def _upright(image: Picture, rotation: float) -> Picture:
-    """Turns the brightness as players show it: a phone tells how it was held."""
-    quarters = _quarters(rotation)
-    return cast("Picture", np.ascontiguousarray(np.rot90(image, quarters))) if quarters else image
+class Orientation(NamedTuple):
+    """Tells how players show a frame, by the file: a phone tells how it was held, or mirrors it.
+
+    Attributes:
+        transposed: whether rows are shown as columns, before these are reversed.
+        rows_reversed: whether what is then the last row is shown first.
+        columns_reversed: likewise.
+    """
+
+    transposed: bool = False
+    rows_reversed: bool = False
+    columns_reversed: bool = False
+
+    def shown(self, image: Picture) -> Picture:
+        """Turns and mirrors the brightness as players show it."""
+        rows, columns = (-1 if each else 1 for each in self[1:])
+        image = (image.T if self.transposed else image)[::rows, ::columns]
+        return cast("Picture", np.ascontiguousarray(image))
 
 
-def _quarters(rotation: float) -> int:
-    return round(rotation / 90) % 4
+def _orientation(frame: av.VideoFrame) -> Orientation:
+    """Reads the matrix by which pixels (x, y, 1), y down, go to their places, if there is one."""
+    matrix = frame.side_data.get("DISPLAYMATRIX")
+    if matrix is None:
+        return Orientation()
+    (a, b), (c, d) = np.frombuffer(cast("bytes", matrix), np.int32).reshape(3, 3)[:2, :2].tolist()
+    transposed = abs(b) + abs(c) > abs(a) + abs(d)
+    x, y = (c, b) if transposed else (a, d)
+    return Orientation(transposed, rows_reversed=y < 0, columns_reversed=x < 0)
 
 
-def quarter_turns(video: Path) -> int:
-    """Reads by how many quarter turns, counter-clockwise, frames are turned as they are read.
+def orientation_of(video: Path) -> Orientation:
+    """Reads how frames are turned and mirrored as they are read.
 
-    A file that cannot be read has none: reading its frames tells what is wrong.
+    Those of a file that cannot be read are not: reading its frames tells what is wrong.
     """
     if not video.is_file():
-        return 0
+        return Orientation()
     try:
         with _opened(video) as container:
             frame = next(iter(container.decode(container.streams.video[0])), None)
-            return 0 if frame is None else _quarters(frame.rotation)
+            return Orientation() if frame is None else _orientation(frame)
     except (av.FFmpegError, IndexError, UserError):
-        return 0
+        return Orientation()
 
 
 def _brightness(frame: av.VideoFrame) -> Picture:

@@ -17,7 +17,6 @@ from pipeline.tracking.frames import (
     Frame,
     Recording,
     import_video,
-    quarter_turns,
     read_frames,
     read_pictures,
 )
@@ -131,25 +130,51 @@ def test_a_file_of_many_pictures_is_refused(tmp_path: Path, clip: list[np.ndarra
         next(read_frames(tmp_path, rate=1.0))
 
 
-def test_a_phone_s_video_is_shown_upright(tmp_path: Path) -> None:
-    """The header of the track tells by how much players are to turn it."""
+ONE = 1 << 16
+
+
+def as_held(folder: Path, matrix: tuple[int, int, int, int]) -> Path:
+    """A clip whose track's header tells players (a, b, c, d) how to show it."""
     held = bytearray((CLIPS / "f_silhouette.mp4").read_bytes())
+    at, (a, b, c, d) = held.index(b"tkhd") + 4 + 40, matrix  # behind version, times, ids and layer
+    held[at : at + 36] = struct.pack(">9i", a, b, 0, c, d, 0, 768 * ONE, 0, 1 << 30)
+    path = folder / "phone.mp4"
+    path.write_bytes(held)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("matrix", "axes", "steps"),
+    [
+        ((0, ONE, -ONE, 0), (1, 0), (1, -1)),
+        ((0, -ONE, ONE, 0), (1, 0), (-1, 1)),
+        ((-ONE, 0, 0, -ONE), (0, 1), (-1, -1)),
+        ((-ONE, 0, 0, ONE), (0, 1), (1, -1)),  # mirrored, as all below
+        ((ONE, 0, 0, -ONE), (0, 1), (-1, 1)),
+        ((0, ONE, ONE, 0), (1, 0), (1, 1)),
+        ((0, -ONE, -ONE, 0), (1, 0), (-1, -1)),
+    ],
+)
+def test_a_phone_s_video_is_turned_and_mirrored_as_players_show_it(
+    tmp_path: Path,
+    matrix: tuple[int, int, int, int],
+    axes: tuple[int, int],
+    steps: tuple[int, int],
+) -> None:
     plain = next(read_frames(CLIPS / "f_silhouette.mp4")).image
-    matrix = held.index(b"tkhd") + 4 + 40  # behind version, times, ids and layer
-    one = 1 << 16
-    held[matrix : matrix + 36] = struct.pack(">9i", 0, one, 0, -one, 0, 0, 768 * one, 0, 1 << 30)
-    phone = tmp_path / "phone.mp4"
-    phone.write_bytes(held)
-    np.testing.assert_array_equal(next(read_frames(phone)).image, np.rot90(plain, -1))
-    assert quarter_turns(CLIPS / "f_silhouette.mp4") == 0
-    assert quarter_turns(phone) == 3
+    wanted = np.transpose(plain, axes)[:: steps[0], :: steps[1]]
+    np.testing.assert_array_equal(next(read_frames(as_held(tmp_path, matrix))).image, wanted)
+
+
+def test_readout_knows_which_row_is_shown_first(tmp_path: Path) -> None:
     given = {"video": "phone.mp4", "structure": "cloaked", "readout": "20 ms"}
-    asked = Recording.model_validate(given)
-    with refused("the camera's rows are its columns", "readout"):
-        readout_of(asked, phone, tmp_path / "phone.yaml")
-    held[matrix : matrix + 36] = struct.pack(">9i", -one, 0, 0, 0, -one, 0, 0, 0, 1 << 30)
-    phone.write_bytes(held)
-    assert readout_of(asked, phone, tmp_path / "phone.yaml") == -0.02
+    asked, source = Recording.model_validate(given), tmp_path / "phone.yaml"
+    for matrix in ((0, ONE, -ONE, 0), (0, ONE, ONE, 0)):
+        with refused("the camera's rows are its columns", "readout"):
+            readout_of(asked, as_held(tmp_path, matrix), source)
+    for across, down in ((-ONE, -ONE), (-ONE, ONE), (ONE, -ONE)):
+        held = as_held(tmp_path, (across, 0, 0, down))
+        assert readout_of(asked, held, source) == np.copysign(0.02, down)
 
 
 def test_pictures_behind_the_window_are_not_read(tmp_path: Path, clip: list[np.ndarray]) -> None:
