@@ -93,7 +93,8 @@ def estimate_peaks(sides: Sides, random: np.random.Generator) -> Floats:
     out = np.full((3, *sides.measured.shape[1:], 3), np.nan)
     for place, motion in enumerate(sides.motions):
         out[place, ..., 0] = peak_to_peak(motion)
-    ends = [end(np.nan_to_num(sides.measured), axis=0) for end in (np.argmin, np.argmax)]
+    known = np.isfinite(sides.measured)
+    ends = [np.where(known, way * sides.measured, -np.inf).argmax(axis=0) for way in (-1, 1)]
     sigma = np.hypot(*(np.take_along_axis(sides.sigma, end[None], axis=0)[0] for end in ends))
     middle = out[0, ..., 0] - _added_by_noise(sides, random)
     out[0, ..., 1], out[0, ..., 2] = (middle + sign * _SPREAD * sigma for sign in (-1, 1))

@@ -1,6 +1,7 @@
 from functools import partial
 
 import numpy as np
+import pytest
 
 from pipeline.comparison import curves
 from pipeline.comparison.compared_quantities import (
@@ -44,6 +45,18 @@ def test_intervals_of_peaks_hold_the_truth_though_noise_makes_them_larger() -> N
     assert ((low <= 2.0) & (high >= 2.0)).mean() > 0.9
     assert (high - low).mean() < 6 * NOISE
     np.testing.assert_allclose(found[1, ..., 1:].mean(axis=(0, 1)), [1.8, 2.2], atol=0.03)
+
+
+@pytest.mark.parametrize("offset", [3.0, -3.0])
+def test_intervals_of_peaks_are_of_frames_that_were_seen(offset: float) -> None:
+    """Units that stay on one side of where they rest have no extreme at zero, nor where unseen."""
+    whole = sides(WAVES + offset)
+    middle = np.abs(whole.measured[10] - offset) < 0.5
+    missed = whole._replace(measured=whole.measured.copy(), sigma=whole.sigma.copy())
+    missed.measured[10], missed.sigma[10] = np.nan, np.nan
+    for seen in (whole, missed):
+        low, high = np.moveaxis(curves.estimate_peaks(seen, np.random.default_rng(0))[0], -1, 0)[1:]
+        np.testing.assert_allclose((high - low)[middle], 2 * 1.96 * NOISE * np.sqrt(2), rtol=1e-4)
 
 
 def test_a_departure_is_that_from_the_other_motion() -> None:
