@@ -105,7 +105,7 @@ def _init(video: Path, args: argparse.Namespace) -> None:
     found = proposal.propose(first.image, design, scale)
     out, drawn = (args.out_dir / f"{video.stem}{end}" for end in (".yaml", "_units.png"))
     if out.exists():
-        raise UserError("there is a recording already", file=out, remedy="remove it, or --out-dir")
+        raise _there_is_one(out)
     values = {
         "title": video.stem,
         "video": os.path.relpath(video.resolve(), out.resolve().parent),
@@ -165,15 +165,23 @@ def _import(path: Path, args: argparse.Namespace) -> None:
     described = import_video.description(path)
     shown = import_video.video_of(path) if args.video is None else args.video
     name, folder = shown.stem, args.out_dir
+    out, design = folder / f"{name}_recording.yaml", folder / f"{name}_design.nc"
+    text = import_video.recording_text(described, shown.resolve(), design.name)
+    if out.exists() and out.read_text(encoding="utf-8") != text:
+        raise _there_is_one(out)
     origin = {
         "problem": "{}",
         "problem_hash": provenance.file_hash(path),
         "parents": json.dumps({"description": provenance.file_hash(path)}),
     }
-    datasets.write(import_video.design(described), folder / f"{name}_design.nc", "design", origin)
-    text = import_video.recording_text(described, shown.resolve(), f"{name}_design.nc")
-    (folder / f"{name}_recording.yaml").write_text(text, encoding="utf-8")
-    LOG.info("python -m pipeline track %s --out %s", folder / f"{name}_recording.yaml", "track.nc")
+    datasets.write(import_video.design(described), design, "design", origin)
+    with write_atomically(out) as aside:
+        aside.write_text(text, encoding="utf-8")
+    LOG.info("python -m pipeline track %s --out %s", out, "track.nc")
+
+
+def _there_is_one(out: Path) -> UserError:
+    return UserError("there is a recording already", file=out, remedy="remove it, or --out-dir")
 
 
 def _track(path: Path, args: argparse.Namespace) -> None:

@@ -22,6 +22,7 @@ from pipeline.posing import (
     unit_coordinates,
 )
 from pipeline.problem import Problem
+from pipeline.runtime import write_atomically
 from reports.base import style
 from reports.figures.loading_path import DRIVE_TINT, INTEREST_TINT, UNIT_TINT, rest_panel
 from reports.panels import CLAMP_TINT, CLOAK_TINT
@@ -41,7 +42,6 @@ def report(args: argparse.Namespace) -> None:
     asked = problem.load(args.problem, args.preset)
     scene = scene_of(asked, args.problem.parent)
     told = [cost_line(asked, scene), *(f"warning: {line}" for line in doubts(asked, scene))]
-    args.out_dir.mkdir(parents=True, exist_ok=True)
     with style.styled():
         figure = style.page(SIDE + 22.0, SIDE)
         axes = style.place(figure, 2.0, 8.0, SIDE - 4.0, SIDE - 4.0)
@@ -50,7 +50,8 @@ def report(args: argparse.Namespace) -> None:
         axes.set_title(style.literal(asked.title or args.problem.parent.name))
         _legend(axes, asked)
         path = args.out_dir / "check.png"
-        figure.savefig(path, dpi=150)
+        with write_atomically(path) as aside:
+            figure.savefig(aside, format="png", dpi=150)
     print("\n".join([*told, f"picture: {path}"]), file=sys.stderr)  # noqa: T201
 
 

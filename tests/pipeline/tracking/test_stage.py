@@ -1,3 +1,4 @@
+import errno
 from pathlib import Path
 
 import av
@@ -20,6 +21,32 @@ def recording(tmp_path: Path) -> Path:
     words = ["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", str(tmp_path)]
     assert run_stage("track", words) == 0
     return tmp_path / "f_silhouette_recording.yaml"
+
+
+def test_a_recording_is_imported_whole_or_not_at_all(
+    recording: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", str(recording.parent)]
+    assert run_stage("track", words) == 0
+    whole = recording.read_bytes()
+
+    def breaks_off(path: Path, text: str, encoding: str) -> None:
+        path.write_bytes(text.encode(encoding)[:20])
+        raise OSError(errno.ENOSPC, "full")
+
+    with monkeypatch.context() as full:
+        full.setattr(Path, "write_text", breaks_off)
+        assert run_stage("track", words) == 2
+    assert "the disk is full" in capsys.readouterr().err
+    assert recording.read_bytes() == whole
+    assert len(list(recording.parent.iterdir())) == 2
+
+
+def test_a_recording_that_was_edited_is_not_written_over(recording: Path, failing: Failing) -> None:
+    extended(recording, "frame_rate: 300 Hz")
+    words = ["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", str(recording.parent)]
+    assert "there is a recording already" in failing("track", words)
+    assert "frame_rate: 300 Hz" in recording.read_text(encoding="utf-8")
 
 
 def refused(recording: Path, failing: Failing) -> str:
