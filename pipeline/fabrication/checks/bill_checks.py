@@ -13,6 +13,8 @@ from pipeline.fabrication.checks.slot_checks import measured_slots
 from pipeline.fabrication.papers import BILL, read_bill
 from pipeline.fabrication.parts import SHIM_PLAY
 from pipeline.fabrication.readback import BUG, Drawing, Fault
+from pipeline.fabrication.units import strip_between
+from sim.core import Floats
 
 _PLAY = 0.02  # mm by which measured slots may be deeper or shallower
 _WRITTEN = 1e-3  # mm
@@ -53,19 +55,25 @@ def _shim_of(row: Mapping[str, str]) -> str:
 def _shim_lengths(record: PackageRecord) -> dict[int, float]:
     """Measures ligaments from slot end to slot end along the shim, mm, by their numbers."""
     designs = record.expected.polygons
-    depths = {
-        (label, slot.vertex): slot.depth
+    held = {
+        (label, slot.vertex): np.asarray(slot.held.coords)
         for label, shape in record.shapes.items()
         if isinstance(shape, Polygon)
         for slot in measured_slots(designs[label], shape, record.settings.slot_width)
     }
-    lengths = {}
-    for number, joint in record.expected.joints.items():
-        if all(end in depths for end in joint):
-            mouths = [designs[label].exterior.coords[vertex] for label, vertex in joint]
-            gap = float(np.linalg.norm(np.subtract(*mouths)))
-            lengths[number] = gap + sum(depths[end] for end in joint)
-    return lengths
+    return {
+        number: _along(*(held[end] for end in joint))
+        for number, joint in record.expected.joints.items()
+        if all(end in held for end in joint)
+    }
+
+
+def _along(first: Floats, second: Floats) -> float:
+    """Measures a shim between two lines (2, 2) along which slots hold it, to their inner ends."""
+    grips = [float(np.linalg.norm(line[1] - line[0])) for line in (first, second)]
+    out, into = (line[at] - line[1 - at] for line, at in ((first, 0), (second, 1)))
+    strip = strip_between(first[0], out / grips[0], second[0], into / grips[1])
+    return strip.length + sum(grips)
 
 
 def check_shim_pieces(path: Path, drawings: Sequence[Drawing]) -> Iterator[Fault]:

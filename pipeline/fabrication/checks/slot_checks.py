@@ -35,6 +35,7 @@ class MeasuredSlot:
     width: float  # mm
     wall: float  # thinnest wall around the inner end, mm
     lip: float  # thinnest wall beside the mouth, mm
+    held: LineString  # its middle line, from where both walls are there to the inner end
 
 
 def measured_slots(design: Polygon, made: Polygon, width: float) -> list[MeasuredSlot]:
@@ -63,7 +64,8 @@ def _measured(shape: Polygon, made: Polygon, corners: Floats) -> MeasuredSlot:
     around = shapely.union(made, shape.buffer(2e-4)).boundary
     wall = float(line.distance(around.difference(shape.buffer(0.1 * width))))
     within = shape.intersection(reach)
-    return MeasuredSlot(vertex, within, line, depth, width, wall, _lip(made, inner, axis))
+    lip, held = _lip(made, inner, axis), _held(made, inner, axis)
+    return MeasuredSlot(vertex, within, line, depth, width, wall, lip, held)
 
 
 def _owner(shape: Polygon, corners: Floats) -> int:
@@ -107,6 +109,19 @@ def _lip(made: Polygon, inner: Floats, axis: Floats) -> float:
         tip = start - (beside - _BACK) * axis
         walls.append(_first(LineString([tip, tip + _FAR * aside]), made))
     return min(walls)
+
+
+def _held(made: Polygon, inner: Floats, axis: Floats) -> LineString:
+    """Draws the middle line of a slot as far as there are walls on both sides.
+
+    Across the inner end, as cut: where the mouth is cut back unevenly the axis is a little aside.
+    """
+    end, across = inner.mean(axis=0), _unit(inner[1] - inner[0])
+    way = np.array([-across[1], across[0]]) * np.sign(axis @ [-across[1], across[0]])
+    starts = inner + _BACK * np.array([[-1.0], [1.0]]) * across
+    walls = [_first(LineString([start, start - _FAR * way]), made) for start in starts]
+    grip = max(_HAIR, min(walls))
+    return LineString([end - grip * way, end])
 
 
 def _first(ray: LineString, made: Polygon) -> float:

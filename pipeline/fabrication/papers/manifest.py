@@ -19,7 +19,7 @@ _READ = ("units", "letters_for_ids", "shims", "prebend", "as_built", "thin_walls
 PREBEND_NOTE = (
     "each shim before any load, by the number of its ligament: units that it joins; middle of the"
     " ligament; angles of its slots against it, counter-clockwise; largest strain and largest"
-    " moment, of a strip clamped where the walls of its slots begin (small slopes)"
+    " moment, of a strip that slides in clamps where the walls of its slots begin"
 )
 
 

@@ -136,6 +136,11 @@ class Slot:
         return self.mouth + self.depth * self.direction
 
     @property
+    def grip(self) -> float:
+        """Length in which its walls hold the shim."""
+        return self.depth - self.truncation
+
+    @property
     def held(self) -> Floats:
         """(2,) where its walls begin to hold the shim."""
         return self.mouth + self.truncation * self.direction
@@ -180,8 +185,8 @@ class Ligament:
 
     number: int  # id in the datasets
     labels: tuple[str, str]  # the units that it joins
-    length: float  # of the shim: distance of the vertices and both depths
-    free: float  # of the shim between the truncated mouths
+    length: float  # of the shim, along it from one slot's inner end to the other's
+    free: float  # of the shim between the truncated mouths, along it
     middle: tuple[float, float]  # (2,) of the ligament as designed
     angles: tuple[float, float] = (0.0, 0.0)  # of both slots against it, counter-clockwise, rad
     strain: float = 0.0  # largest one of the shim before any load

@@ -1,4 +1,5 @@
 from . import tracking_dots as tracking_dots
+from .elastica import strip_between as strip_between
 from .specimen_units import build_specimen as build_specimen
 from .specimen_units import sort_shims as sort_shims
 from .specimen_units import summary as summary

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from pipeline.fabrication.parts import Slot
-from pipeline.fabrication.units.prebend import peak_curvature, signed_angle
+from pipeline.fabrication.units.elastica import signed_angle
+from pipeline.fabrication.units.prebend import peak_curvature
 from pipeline.problem.sections import Fabrication
 from sim.constraints import slot_depth
 from sim.core import Floats, Ints

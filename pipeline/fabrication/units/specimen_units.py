@@ -5,7 +5,6 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
 import shapely
 
 from pipeline.fabrication.engraving import orientation_mark, place_id
@@ -126,12 +125,12 @@ def _ligaments(
             next(slot for slot in units[unit].slots if slot.vertex == vertex)
             for unit, vertex in ((a, p), (b, q))
         )
-        gap = float(np.linalg.norm(other.mouth - one.mouth))
-        length = round(gap + one.depth + other.depth, 4)
-        free = gap + one.truncation + other.truncation
-        x, y = ((one.mouth + other.mouth) / 2.0).tolist()
         pair, bent = (net.labels[a], net.labels[b]), prebend(one, other, settings)
-        ligaments.append(Ligament(number, pair, length, free, (x, y), *bent))
+        length = round(one.grip + bent.free + other.grip, 4)
+        x, y = ((one.mouth + other.mouth) / 2.0).tolist()
+        ligaments.append(
+            Ligament(number, pair, length, bent.free, (x, y), bent.angles, bent.strain, bent.moment)
+        )
     return tuple(ligaments)
 
 
@@ -144,9 +143,11 @@ def _refuse_bent(
     if worst is None or worst.strain <= most:
         return
     angles = " and ".join(f"{math.degrees(angle):.0f}" for angle in worst.angles)
+    bent = f"is bent to a strain of {100 * worst.strain:.1f} % before any load, by"
+    if math.isinf(worst.strain):
+        bent = "comes to rest in no shape between"
     raise UnbuildableUnitError(
-        f"the shim {worst.name} is bent to a strain of {100 * worst.strain:.1f} % before any load,"
-        f" by slots that are turned {angles} deg from the ligament",
+        f"the shim {worst.name} {bent} slots that are turned {angles} deg from the ligament",
         tuple(unit.outline for unit in units.values() if unit.label in worst.labels),
         shapely.Point(worst.middle),
         file=file,

@@ -16,7 +16,7 @@ import shapely
 from shapely import Polygon
 
 from pipeline.fabrication.parts import STRAIGHT, Slot, UnbuildableUnitError
-from pipeline.fabrication.units.prebend import prebend
+from pipeline.fabrication.units.prebend import slender_strain, slot_angles
 from pipeline.fabrication.units.slot_candidates import Corner, side_truncations
 from pipeline.fabrication.units.slots import NoRoomError, place_slots
 from pipeline.fabrication.units.unit_network import UnitNetwork, corners, refuse_overlaps
@@ -72,7 +72,7 @@ def unit_bodies(net: UnitNetwork, settings: Fabrication, file: Path) -> dict[int
 
     def strains(number: int, slots: Sequence[Slot]) -> list[float]:
         ends = zip(slots, (facing(number, corner) for corner in slotted[number]), strict=True)
-        return [prebend(slot, end, settings).strain for slot, end in ends if end is not None]
+        return [slender_strain(slot, end, settings) for slot, end in ends if end is not None]
 
     for number in order:
         made[number] = place(number)
@@ -180,4 +180,4 @@ def end_angles(net: UnitNetwork, settings: Fabrication, file: Path) -> Floats:
     made = unit_bodies(net, settings, file)
     slots = {(number, slot.vertex): slot for number in made for slot in made[number].slots}
     pairs = ((slots[one], slots[other]) for _, one, other, _ in net.ligaments)
-    return np.array([prebend(*pair, settings).angles for pair in pairs]).reshape(-1, 2)
+    return np.array([slot_angles(*pair) for pair in pairs]).reshape(-1, 2)
