@@ -35,6 +35,7 @@ from .structure_variables import Variables as Variables
 from .structure_variables import design_hash as design_hash
 from .structure_variables import designed_angles as designed_angles
 from .structure_variables import flat_vertices as flat_vertices
+from .structure_variables import free_dofs as free_dofs
 from .structure_variables import network_variables as network_variables
 from .structure_variables import read_design as read_design
 from .structure_variables import spread as spread

@@ -14,7 +14,8 @@ from pipeline.posing.to_scene import altered_lattice_of, lattice_of
 from pipeline.problem import Problem
 from pipeline.runtime import UserError
 from sim.core import Floats
-from sim.scene import Scene
+from sim.scene import DOFS, Scene
+from sim.solvers import FORCE
 from sim.structure import Lattice
 
 Variables = dict[str, tuple[Any, ...]]
@@ -55,6 +56,27 @@ def network_variables(problem: Problem, scene: Scene) -> Variables:
         "support": (("unit",), support),
         "ligament_unit": (("ligament", "end"), intact.ligament_units),
         "ligament_vertex": (("ligament", "end"), local),
+    }
+
+
+def free_dofs(scene: Scene) -> dict[int, tuple[str, ...]]:
+    """Lists the degrees of freedom of clamped and driven units that no load takes, by unit.
+
+    Those along which a force drives are taken.
+    """
+    loads, lattice = scene.loads, scene.lattice
+    taken = np.zeros((lattice.n_units, 3), dtype=bool)
+    taken.flat[loads.held] = True
+    for case in loads.cases:
+        if case.control is not None:
+            taken[case.units] |= case.control == FORCE
+    supported = np.union1d(loads.clamped // 3, loads.driven)
+    return {
+        int(lattice.id[unit]): tuple(
+            dof for dof, held in zip(DOFS, taken[unit], strict=True) if not held
+        )
+        for unit in supported.tolist()
+        if not taken[unit].all()
     }
 
 

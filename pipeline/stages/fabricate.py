@@ -5,6 +5,7 @@ import logging
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +17,11 @@ from pipeline.fabrication.papers import bill_rows, write_assembly_sheet, write_b
 from pipeline.fabrication.parts import THIN_WALL, BuiltSpecimen, UnbuildableUnitError
 from pipeline.fabrication.readback import draw
 from pipeline.fabrication.units import build_specimen, network, summary
-from pipeline.posing import designed_angles, read_design, scene_of, structures_of
+from pipeline.posing import designed_angles, free_dofs, read_design, scene_of, structures_of
 from pipeline.problem import Problem
 from pipeline.runtime import cli, write_folder_atomically
 from sim.core import SimulationError
-from sim.scene import as_built
+from sim.scene import Scene, as_built
 
 LOG = logging.getLogger(__name__)
 
@@ -33,7 +34,7 @@ def work(args: argparse.Namespace) -> None:
     posed = problem.load(args.problem, args.preset)
     settings = posed.fabrication
     design = datasets.read(args.design, "design")
-    net = network(design, args.structure)
+    net, scene = network(design, args.structure), scene_of(posed, args.problem.parent)
     study = args.problem.resolve().parent.name + (f"@{args.preset}" if args.preset else "")
     pictures = args.out_dir.with_name(f"{args.out_dir.name}_faults")
     shutil.rmtree(pictures, ignore_errors=True)
@@ -44,22 +45,27 @@ def work(args: argparse.Namespace) -> None:
     ):
         names = (study, args.structure)
         with _picture_of_fault(pictures):
-            specimen = build_specimen(net, settings, names, args.design, bar.update)
+            built = build_specimen(net, settings, names, args.design, bar.update)
+        free = {net.labels[n]: dofs for n, dofs in free_dofs(scene).items() if n in net.labels}
+        specimen = replace(built, free_dofs=free)
         package = PackageFolder(room, specimen, posed, str(args.problem), bar.update)
         package.write()
         write_assembly_sheet(room / "assembly.pdf", specimen, settings)
         density = posed.material.density
         printing = (package.contents, package.prints, posed.infill)
         write_bill(room / "bom.csv", bill_rows(specimen, settings, density, *printing))
-        built = _as_built(specimen, posed, args)
-        write_manifest(room, specimen, posed, args.design, built)
+        simulated = _as_built(specimen, scene, posed, args)
+        write_manifest(room, specimen, posed, args.design, simulated)
         check_package(room, design, args.structure, settings, pictures, bar.update)
     LOG.info("%s: %s", args.out_dir, summary(specimen))
     if specimen.thin:
         thinnest = min(specimen.thin, key=lambda label: specimen.thin[label])
         thin = (args.out_dir, len(specimen.thin), THIN_WALL, specimen.thin[thinnest], thinnest)
         LOG.warning("%s: %d units have walls under %g mm (from %.2f mm, unit %s)", *thin)
-    if (worse := loss_warning(built or {})) is not None:
+    if words := specimen.free_words:
+        what = f"the study leaves free {words}, but the fixtures hold these units in every way"
+        LOG.warning("%s: %s; guides for them are yours to make", args.out_dir, what)
+    if (worse := loss_warning(simulated or {})) is not None:
         LOG.warning("%s: %s", args.out_dir, worse)
 
 
@@ -75,13 +81,12 @@ def loss_warning(built: Mapping[str, float | str]) -> str | None:
 
 
 def _as_built(
-    specimen: BuiltSpecimen, posed: Problem, args: argparse.Namespace
+    specimen: BuiltSpecimen, scene: Scene, posed: Problem, args: argparse.Namespace
 ) -> dict[str, float | str] | None:
     """Simulates the structure with its shims as drawn; None of one that the study does not load.
 
     A motion that cannot be followed is told in the place of its numbers: the files are right.
     """
-    scene = scene_of(posed, args.problem.parent)
     design = read_design(posed, args.design)
     structure = structures_of(scene, design, straight=True).get(args.structure)
     if structure is None:

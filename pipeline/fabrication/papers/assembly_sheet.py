@@ -211,6 +211,12 @@ def assembly_steps(
         driven = ", ".join(specimen.driven)
         room = "Where neighbours leave an adapter no room for fingers, glue it on."
         steps.append(f"Fix the adapter or the grip of the drive to: {driven}. {room}")
+    if specimen.free_words:
+        steps.append(
+            f"The study leaves free {specimen.free_words}; pads, grips and adapters hold these "
+            "units in every way. Let them slide or turn in guides of your own instead, or the "
+            "specimen is another structure than was simulated."
+        )
     return [*steps, "Lift the specimen out of the jig and move it by hand: no shim may slip."]
 
 

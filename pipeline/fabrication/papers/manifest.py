@@ -13,7 +13,16 @@ from pipeline.runtime import UserError
 
 MANIFEST = "manifest.json"
 _AGAIN = "make the package again: python -m pipeline fabricate, or snakemake --forcerun fabricate"
-_READ = ("units", "letters_for_ids", "shims", "prebend", "as_built", "thin_walls_mm", "files")
+_READ = (
+    "units",
+    "letters_for_ids",
+    "shims",
+    "prebend",
+    "free_dofs",
+    "as_built",
+    "thin_walls_mm",
+    "files",
+)
 
 
 PREBEND_NOTE = (
@@ -70,6 +79,8 @@ def write_manifest(
         "shims": {shim.id: shim.count for shim in specimen.shims},
         "prebend": {str(one.number): _prebend(one) for one in specimen.ligaments},
         "prebend_note": PREBEND_NOTE,
+        "free_dofs": {label: list(dofs) for label, dofs in specimen.free_dofs.items()},
+        "free_dofs_note": "of clamped and driven units in the study; the fixtures hold them all",
         "as_built": as_built,
         "thin_walls_mm": {label: round(wall, 3) for label, wall in specimen.thin.items()},
         "packages": dict(package_versions()),

@@ -6,8 +6,8 @@ the right, y up, seen from the top); z = 0 is the underside.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -225,6 +225,16 @@ class BuiltSpecimen:
     shims: tuple[Shim, ...]  # in ascending order of their lengths
     clamped: tuple[str, ...] = ()  # labels of the units that fixtures hold
     driven: tuple[str, ...] = ()  # likewise
+    # by label of these units: ux, uy or theta that the study leaves free; fixtures hold them all
+    free_dofs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def free_words(self) -> str:
+        """Tells what the study leaves free of held units, "ux of A1, A2"; empty if nothing."""
+        labels: dict[tuple[str, ...], list[str]] = {}
+        for label, dofs in self.free_dofs.items():
+            labels.setdefault(dofs, []).append(label)
+        return "; ".join(f"{' and '.join(d)} of {', '.join(units)}" for d, units in labels.items())
 
     @property
     def letters(self) -> dict[str, str]:

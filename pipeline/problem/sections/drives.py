@@ -36,7 +36,7 @@ class Support(Section):
 
     Attributes:
         units: by side, or listed.
-        clamp: the degrees of freedom.
+        clamp: the degrees of freedom; what is built holds all three, and says so.
     """
 
     units: Selector
@@ -49,7 +49,8 @@ class _Drive(Section):
     Attributes:
         kind: which of the drives this is.
         units: that are driven.
-        free: degrees of freedom of these units that nothing holds, such as the way sideways.
+        free: degrees of freedom of these units that nothing holds, such as the way sideways; what
+            is built holds them.
     """
 
     unit: ClassVar[str] = "mm"

@@ -136,6 +136,9 @@ def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[PackageFact]:
     if letters := told["letters_for_ids"]:
         note = ", ".join(f"{letter} is {label}" for label, letter in letters.items())
         yield PackageFact(f"{len(letters)}", "units with a letter for their id", note)
+    if free := told["free_dofs"]:
+        note = "in the study; the fixtures hold them in every way: guides are yours to make"
+        yield PackageFact(f"{len(free)}", "held units that are free along or about an axis", note)
     volume = float(units["volume_mm3"]) / 1000.0
     yield PackageFact(f"{volume:.0f} cm³", "volume of the units", "as if solid")
     sheets = sum(int(r["count"]) for r in bill if r["item"] == "sheet" and "_nominal" in r["id"])
