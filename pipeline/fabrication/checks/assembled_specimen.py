@@ -21,7 +21,7 @@ def unit_sections(
     solid: MeshBody, expected: ExpectedParts, settings: Fabrication
 ) -> dict[str, Geometry]:
     """Cuts an assembled specimen into outlines, each over the design that it covers most of."""
-    sections = shapely.get_parts(solid.section(settings.thickness / 2))
+    sections = shapely.get_parts(solid.section(settings.plain_height))
     labels, designs = list(expected.polygons), np.array(list(expected.polygons.values()))
     over, under = STRtree(designs).query(sections, predicate="intersects")
     shared = shapely.area(shapely.intersection(sections[over], designs[under]))

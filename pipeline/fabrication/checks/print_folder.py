@@ -120,7 +120,7 @@ def _check_unit(label: str, solid: MeshBody, record: PackageRecord) -> Iterator[
     if min(abs(high - top), abs(high - levels[-1])) > TOLERANCE:  # dots need not have room
         yield solid.fault(f"it is {high:.3f} mm high instead of {levels[-1]:g} mm", "thickness")
     yield from check_volume(solid, levels)
-    middle = solid.section(top / 2)
+    middle = solid.section(settings.plain_height)
     yield from check_outline(label, solid.file, middle, record.shapes)
     inner = middle.buffer(-settings.print.first_layer_inset - _NEAR)
     underside = solid.section(((first if first < sunk else 0.0) + sunk) / 2)

@@ -276,6 +276,12 @@ class Fabrication(Section):
         return self
 
     @property
+    def plain_height(self) -> float:
+        """Height at which a unit has neither letters nor dots, which may take half of it, mm."""
+        recess = self.markers.depth if self.markers.kind == "recess" else 0.0
+        return (self.labels.depth + self.thickness - recess) / 2.0
+
+    @property
     def laser_layers(self) -> int:
         """Number of equal layers that a unit is cut in, for its slots to be cut through."""
         return math.ceil(self.thickness / (self.laser.aspect_ratio * self.slot_width) - 1e-9)

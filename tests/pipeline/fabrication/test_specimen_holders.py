@@ -166,6 +166,15 @@ def test_letters_take_half_of_a_thin_base_at_most(depth: float, base: float) -> 
     assert clamp.layers[1].top == base
 
 
+@pytest.mark.parametrize("thickness", [0.1, 0.2, 0.5, 8.1])
+def test_jaws_stand_lower_than_the_units_and_higher_than_the_base(thickness: float) -> None:
+    given = {"thickness": thickness, "labels": {"depth": 0.05}}
+    asked = Fabrication.model_validate(given, context=SIM_UNITS)
+    made = {part.id: part for part in fixtures(handmade.specimen(), asked, handmade.SPACING)}
+    jaws, base = made["CLAMP-A1"].layers[-1], asked.fixture.base
+    assert base + 0.4 * thickness < jaws.top < base + thickness
+
+
 @pytest.mark.parametrize("name", ["fig4"])
 def test_columns_of_squares_are_held_as_they_were(name: str, tmp_path: Path) -> None:
     _, specimen = built(tmp_path, name)
