@@ -52,18 +52,22 @@ def check_laser(record: PackageRecord) -> Iterator[Fault]:
 
 def _thickness(file: Path, settings: Fabrication) -> float:
     """Looks up the material that a sheet is cut from, by the file's name; mm."""
-    foil = settings.shims.thickness
-    kinds = {"units": settings.laser_sheet_thickness, "coupon": settings.thickness, "shims": foil}
+    layer, foil = settings.laser_sheet_thickness, settings.shims.thickness
+    kinds = {"units": layer, "coupon": layer, "shims": foil}
     return kinds.get(file.name.partition("_")[0], settings.laser.template_thickness)
 
 
 def _check_pins(record: PackageRecord) -> Iterator[Fault]:
     """Checks holes for pins: as many as pins in the bill, true to size, walls around each.
 
-    All layers of a unit are cut by one drawing: a stack of them is aligned where its pins are.
+    All layers of a unit, or of the coupon, are cut by one drawing: a stack of them is aligned where
+    its pins are.
     """
     settings, found = record.settings, 0
-    for drawing in record.drawings.get(("units", NOMINAL), []):
+    cut = (
+        sheet for kind in ("units", "coupon") for sheet in record.drawings.get((kind, NOMINAL), [])
+    )
+    for drawing in cut:
         outlines = dict(drawing.outlines())
         for part, curves in drawing.parts().items():
             holes = [curve.polygon for curve in curves if curve.layer == INNER and curve.closed]

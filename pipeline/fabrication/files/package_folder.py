@@ -68,7 +68,7 @@ class PackageFolder:
         yield "shims", shim_pieces(specimen, settings)
         yield "template", list(templates(specimen, spacing, settings))
         yield "comb", [comb(specimen, spacing, gap, settings)]
-        yield "coupon", [coupon(settings)]
+        yield "coupon", [coupon(settings, layered=settings.laminated)]
 
     def _write_print(self) -> None:
         settings, solids = self.problem.fabrication, []

@@ -249,7 +249,8 @@ def _layers_step(specimen: BuiltSpecimen, settings: Fabrication) -> list[str]:
     few = [unit.label for unit in specimen.units if len(unit.pins) < 2]
     alone = f" {len(few)} units have room for one pin or none (bill); their pocket aligns them."
     return [
-        f"Units by laser: cut the drawing {settings.laser_layers} times from sheet of "
+        "Units and coupon by laser: cut their drawings "
+        f"{settings.laser_layers} times from sheet of "
         f"{settings.laser_sheet_thickness:.2f} mm, stack the layers of a unit on pins of "
         f"{settings.laser.pin:g} mm in its pocket of the jig, ids up, and glue."
         + (alone if few else "")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from shapely import LineString
 
-from pipeline.fabrication.fixtures import shim_pieces, strip_parts
+from pipeline.fabrication.fixtures import coupon, shim_pieces, strip_parts
 from pipeline.fabrication.parts import (
     STRAIGHT,
     THIN_WALL,
@@ -32,6 +32,8 @@ FOIL = 1.38e-9
 _GRAMS = 1e6  # in a tonne
 _FEED, _START = 10.0, 0.5  # mm/s of a laser through foil, s until a cut begins; assumed
 _HEADING = "item id count area_mm2 volume_mm3 mass_g length_mm width_mm height_mm files note"
+_LAYERED = ("laser/units_", "laser/coupon_")
+"""Begin the names of the sheets that are cut once for each layer of a unit."""
 _KINDS = {"laser": "sheet", "print": "plate", "fixture": "fixture"}  # of files, by their folder
 
 
@@ -109,7 +111,7 @@ def bill_rows(
         note, count = _counted(len(parts), "part"), 1
         if file.startswith("laser/") and settings.laser.kerf:
             note += f"; {_variant_words(file, settings.laser.kerf)}"
-        if file.startswith("laser/units_"):
+        if file.startswith(_LAYERED):
             note += f"; {settings.laser_route}"
             count = settings.laser_layers if settings.laminated else 1
         if file in prints:
@@ -198,7 +200,9 @@ def _pins(specimen: BuiltSpecimen, settings: Fabrication) -> BillRow:
     for count, words in ((1, "one pin only"), (0, "no room for a pin: the jig alone aligns")):
         if few := [label for label, pins in counts.items() if pins == count]:
             note += f"; {words}: {', '.join(few)}"
-    pin, total = settings.laser.pin, sum(counts.values())
+    tried = len(coupon(settings, layered=True).holes)
+    note += f"; {tried} for the coupon"
+    pin, total = settings.laser.pin, sum(counts.values()) + tried
     return BillRow(
         "pin", f"PIN{pin:g}", total, length=settings.thickness, width=pin, height=pin, note=note
     )

@@ -129,7 +129,7 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     assert found[5]["note"].endswith("; walls from 0.70 mm (thin)")
     (pin,) = (row for row in found if row["item"] == "pin")
     none = "no room for a pin: the jig alone aligns: A1, B1, C1, A2, B2, C2"
-    assert pin["note"] == f"aligns 6 layers; {none}"
+    assert pin["note"] == f"aligns 6 layers; {none}; 2 for the coupon"
     assert first["files"] == "laser/units_01_nominal.dxf print/plate_01.3mf"
     area = specimen.units[0].design.area
     assert float(first["mass_g"]) == pytest.approx(area * 6.18e-3, abs=1e-4)  # kg/m^2 = mg/mm^2

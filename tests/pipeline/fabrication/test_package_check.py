@@ -177,7 +177,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
         "unit A1: it is not on the assembly sheet",
     ),
     "pdf cut short": (halved("assembly.pdf"), "the assembly sheet"),
-    "pins": (edited("bom.csv", "pin,PIN1.5,12", "pin,PIN1.5,11"), "11 pins for 12 holes"),
+    "pins": (edited("bom.csv", "pin,PIN1.5,14", "pin,PIN1.5,13"), "13 pins for 14 holes"),
     "dots": (edited("bom.csv", "dot,dots,12", "dot,dots,11"), "11 dots for 12 holes"),
     "id swapped": (
         edited(f"{UNITS}.dxf", "1000\nA1\n", "1000\nZ9\n", -1),
