@@ -20,7 +20,7 @@ from pipeline.fabrication.parts import (
 from pipeline.fabrication.units.prebend import prebend
 from pipeline.fabrication.units.tracking_dots import dots, pin_holes
 from pipeline.fabrication.units.unit_bodies import UnitBody, unit_bodies
-from pipeline.fabrication.units.unit_network import UnitNetwork, refuse_overlaps
+from pipeline.fabrication.units.unit_network import UnitNetwork, refuse_faults
 from pipeline.fabrication.units.unit_outlines import cut, filleted
 from pipeline.problem.sections import Fabrication
 
@@ -45,10 +45,10 @@ def build_specimen(
         done: called after each unit.
 
     Raises:
-        UnbuildableUnitError: units overlap, a slot or an id has no room, a shim is bent too much;
-            names the unit and what to change.
+        UnbuildableUnitError: units overlap, ligaments share a vertex, a slot or an id has no room,
+            a shim is bent too much; names the unit and what to change.
     """
-    refuse_overlaps(net, file)
+    refuse_faults(net, file)
     units, letters = {}, LETTERS
     for number, body in unit_bodies(net, settings, file).items():
         units[number] = build_unit(net, number, body, settings, file, letters)

@@ -19,7 +19,7 @@ from pipeline.fabrication.parts import STRAIGHT, Slot, UnbuildableUnitError
 from pipeline.fabrication.units.prebend import slender_strain, slot_angles
 from pipeline.fabrication.units.slot_candidates import Corner, side_truncations
 from pipeline.fabrication.units.slots import NoRoomError, place_slots
-from pipeline.fabrication.units.unit_network import UnitNetwork, corners, refuse_overlaps
+from pipeline.fabrication.units.unit_network import UnitNetwork, corners, refuse_faults
 from pipeline.fabrication.units.unit_outlines import cut, filleted, lugs, room_to_grow, wall
 from pipeline.problem.sections import Fabrication
 from sim.core import Floats
@@ -174,9 +174,9 @@ def end_angles(net: UnitNetwork, settings: Fabrication, file: Path) -> Floats:
         file: the design dataset, for messages.
 
     Raises:
-        UnbuildableUnitError: units overlap, or a slot has no room.
+        UnbuildableUnitError: units overlap, ligaments share a vertex, or a slot has no room.
     """
-    refuse_overlaps(net, file)
+    refuse_faults(net, file)
     made = unit_bodies(net, settings, file)
     slots = {(number, slot.vertex): slot for number in made for slot in made[number].slots}
     pairs = ((slots[one], slots[other]) for _, one, other, _ in net.ligaments)

@@ -90,12 +90,30 @@ def corners(net: UnitNetwork) -> dict[int, list[Corner]]:
     return slotted
 
 
-def refuse_overlaps(net: UnitNetwork, file: Path) -> None:
-    """Checks that the units of a design are simple polygons, apart from each other.
+def refuse_faults(net: UnitNetwork, file: Path) -> None:
+    """Checks that units are simple polygons, apart, with one ligament at a vertex.
 
     Raises:
         UnbuildableUnitError: they are not; names the first ones and the remedy.
     """
+    _refuse_overlaps(net, file)
+    taken: dict[tuple[int, int], str] = {}
+    for _, one, other, _ in net.ligaments:
+        name = " - ".join(net.labels[unit] for unit, _ in (one, other))
+        for unit, vertex in (one, other):
+            if (first := taken.setdefault((unit, vertex), name)) is not name:
+                what = f"the ligaments {first} and {name} end at one vertex of unit "
+                what += f"{net.labels[unit]}, {vertex}, where their slots would meet"
+                remedy = "give each a vertex of its own, a wall and a slot or more apart"
+                spot = shapely.Point(net.polygons[unit].exterior.coords[vertex])
+                around = (net.polygons[unit],)
+                raise UnbuildableUnitError(
+                    what, around, spot, file=file, key="ligament_vertex", remedy=remedy
+                )
+
+
+def _refuse_overlaps(net: UnitNetwork, file: Path) -> None:
+    """Checks that the units of a design are simple polygons, apart from each other."""
     polygons = [net.polygons[number] for number in net.numbers]
     for number, polygon in zip(net.numbers, polygons, strict=True):
         if not polygon.is_valid or not polygon.exterior.is_ccw:

@@ -41,9 +41,20 @@ def turned_inside_out(folder: Path) -> None:
     design.to_netcdf(folder / "design.nc")
 
 
+def sharing_a_vertex(folder: Path) -> None:
+    """The ligament of A1 and A2 begins where that of A1 and B1 does."""
+    design = built.design()
+    design["ligament_vertex"][1, 0] = 0
+    design.to_netcdf(folder / "design.nc")
+
+
 BROKEN: dict[str, tuple[Edit, list[str]]] = {
     "overlap": (overlapping, ["the units A1 and B1 overlap", "constraints.gap"]),
     "inside out": (turned_inside_out, ["the outline of unit B1 crosses itself", "constraints"]),
+    "one vertex": (
+        sharing_a_vertex,
+        ["the ligaments A1 - B1 and A1 - A2 end at one vertex of unit A1, 0", "ligament_vertex"],
+    ),
     "cut short": (cut_short, ["design.nc"]),
 }
 MISTAKES = BROKEN | {
@@ -82,5 +93,5 @@ def test_a_mistake_is_told(folder: Path, failing: Failing, name: str) -> None:
     assert not out.exists()
     assert not list(folder.glob("fabrication/.*"))
     picture = folder / "fabrication/cloaked_faults/fault_1.png"
-    assert picture.exists() == (name in {"overlap", "inside out", "slot cuts through"})
+    assert picture.exists() == (name in {*BROKEN} - {"cut short"} | {"slot cuts through"})
     assert picture.exists() == (picture.name in told)
