@@ -80,8 +80,8 @@ class Recording(Section):
         frame_rate: of a folder of pictures or a bare stream (.h264, .hevc), which have no times
             of their own; of a video, it replaces the times in the file, as where a high-speed
             recording plays slowly.
-        exposure: of a frame, whose blur of quick motions is allowed for; without it, that blur
-            tells it.
+        exposure: of a frame, whose blur of quick motions is allowed for, but where side walls show;
+            without it, that blur tells it.
         readout: of a rolling shutter, from the first row of a frame to the last; with it, every
             unit gets the time of its own row.
         camera: whether it stands still, or what the clamped units do together is its own motion.

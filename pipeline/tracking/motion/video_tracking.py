@@ -275,6 +275,11 @@ def _tracker(
     templates = learn_templates(shown.image, camera, grid, *look, left)
     walls = None if depth is None else SideWalls(specimen, depth, grid, templates, *look)
     blur = ExposureBlur(templates, calibration.pixel) if walls is None else None
+    if walls is not None and setup.exposure:
+        LOG.warning(
+            "side walls show: the blur of quick motions in the exposure is not allowed for; units"
+            " that move by more than 0.3 px in it are found less well, or lost"
+        )
     noise = shown.noise * float(np.sqrt(1 + 1 / shown.averaged))
     relocaliser = Relocaliser(specimen, camera, calibration.bright)
     shutter = Shutter(setup.exposure, setup.readout, noise)

@@ -12,6 +12,7 @@ from pipeline import datasets
 from pipeline.problem.sections import VirtualRecording
 from pipeline.tracking.frames import Frame, read_frames
 from pipeline.tracking.motion import Track, track_video
+from pipeline.tracking.reference_frame import RecordingSetup
 from pipeline.virtual_lab import prepare_film, select_case
 from pipeline.virtual_lab.face_marks import FaceMarks
 from pipeline.virtual_lab.filming import VirtualFilm
@@ -36,6 +37,17 @@ def check(film: VirtualFilm, track: Track, bar: float = 0.03) -> None:
     error = track.displacement - film.motion.pose
     assert np.sqrt(np.mean(error[..., :2] ** 2)) / track.calibration.pixel < bar
     assert np.rad2deg(np.sqrt(np.mean(error[..., 2] ** 2))) < 0.15
+
+
+@pytest.mark.parametrize("thickness", [0.0, 8.0])
+def test_an_exposure_that_is_not_allowed_for_is_told(
+    thickness: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Templates that side walls change are not blurred as well."""
+    film = film_of("bare", rate="3 Hz", look={"thickness": f"{thickness} mm"})
+    setup = RecordingSetup(thickness, film.scene.view.eye[2], exposure=0.001)
+    track_video(shown(film), film.scene.specimen, 1 / 0.365, setup=setup)
+    assert ("side walls show: the blur of quick motions" in caplog.text) == (thickness > 0.0)
 
 
 @cases("virtual_lab", "specimen, look")
