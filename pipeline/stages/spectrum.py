@@ -12,6 +12,7 @@ from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.posing import (
     PosedStructure,
+    StoppedError,
     Variables,
     case_directions,
     compute_bands,
@@ -26,11 +27,11 @@ from pipeline.posing import (
 from pipeline.problem import Problem
 from pipeline.problem.sections import Spectrum
 from pipeline.runtime import UserError, cli
-from sim.core import Floats
+from sim.core import Floats, SimulationError
 from sim.scene import concrete_parameters, simulate
 from sim.vibration import Linear, linearised, modes, transmission
 
-STATES = ("at rest", "loaded")
+AT_REST, LOADED = "at rest", "loaded"
 _MODE = ("structure", "state", "mode")
 
 
@@ -59,6 +60,8 @@ def work(args: argparse.Namespace) -> None:
     except UserError as error:
         error.file = error.file or str(args.problem)
         raise
+    except StoppedError as stopped:
+        raise stopped.explain(args.problem) from stopped
     origin = provenance.of_study(asked, "spectrum", parents={"design": args.design})
     datasets.write(made, args.out, "spectrum", origin)
 
@@ -68,14 +71,17 @@ def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr
 
     Raises:
         UserError: the lattice has fewer modes, or no unit cell, or it does not hold the strain.
+        StoppedError: a structure cannot be followed to a full load.
     """
     scene = scene_of(asked, folder)
     structures = structures_of(scene, read_design(asked, design))
     intact = lattice_of(asked)
     found = []
     with cli.progress(len(structures), "linear analysis") as bar:
-        for each in structures.values():
-            found.append(_vibrations(each, wanted, case_directions(asked), intact.n_units))
+        for name, each in structures.items():
+            states = _equilibria(name, each)
+            directions = case_directions(asked)
+            found.append(_vibrations(each, states, wanted, directions, intact.n_units))
             bar.update()
     vertices = [
         spread(s.scene.lattice.padded(s.vertices), s.scene.lattice, intact.n_units)
@@ -95,7 +101,7 @@ def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr
     coordinates: Variables = {
         **unit_coordinates(intact),
         "structure": (("structure",), list(structures)),
-        "state": (("state",), list(STATES[: parts.frequency.shape[1]])),
+        "state": (("state",), state_names(asked)),
         "direction": (("case",), np.rad2deg(case_directions(asked))),
         "dof": (("dof",), ["ux", "uy", "theta"]),
         "mode": (("mode",), np.arange(wanted.modes)),
@@ -105,14 +111,28 @@ def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr
     return xr.Dataset(variables, coordinates)
 
 
+def state_names(asked: Problem) -> list[str]:
+    """Names the equilibria: at rest and, in a static study, under the full load of every case."""
+    loads = [f"{np.rad2deg(angle):.4g} deg" for angle in case_directions(asked)]
+    if not asked.static:
+        return [AT_REST]
+    if len(loads) == 1:
+        return [AT_REST, LOADED]
+    return [AT_REST, *(f"{LOADED}, case {k} ({load})" for k, load in enumerate(loads))]
+
+
 def _vibrations(
-    structure: PosedStructure, wanted: Spectrum, directions: Sequence[float], size: int
+    structure: PosedStructure,
+    states: Sequence[Floats],
+    wanted: Spectrum,
+    directions: Sequence[float],
+    size: int,
 ) -> Vibrations:
-    """About rest, and about the equilibrium under the full load of a static study."""
+    """Vibrations about equilibria (n_units, 3) of a structure in a lattice of ``size`` units."""
     scene, lattice = structure.scene, structure.scene.lattice
     values = concrete_parameters(scene, structure.vertices)
     found = []
-    for state in _equilibria(structure):
+    for state in states:
         made = linearised(scene.topology, values, state)
         frequency, shape = _modes(made, wanted.modes)
         sent = _transmission(made, structure, wanted, directions)
@@ -121,14 +141,17 @@ def _vibrations(
     return Vibrations(*(np.stack(part) for part in zip(*found, strict=True)))
 
 
-def _equilibria(structure: PosedStructure) -> list[Floats]:
-    scene = structure.scene
-    found = [np.zeros((scene.lattice.n_units, 3))]
-    if scene.loads.static:
-        end = np.array([scene.loads.duration])
-        response = simulate(scene, vertices=structure.vertices, times=end, cases=[0])
-        found.append(response.displacement[0, 0])
-    return found
+def _equilibria(name: str, structure: PosedStructure) -> list[Floats]:
+    """Finds the equilibria at rest and, in a static study, under the full load of every case."""
+    scene, rest = structure.scene, np.zeros((structure.scene.lattice.n_units, 3))
+    if not scene.loads.static:
+        return [rest]
+    end = np.array([scene.loads.duration])
+    try:
+        response = simulate(scene, vertices=structure.vertices, times=end)
+    except SimulationError as error:
+        raise StoppedError(error, scene, name, end) from error
+    return [rest, *response.displacement[:, 0]]
 
 
 def _modes(made: Linear, count: int) -> tuple[Floats, Floats]:

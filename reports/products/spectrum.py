@@ -60,7 +60,7 @@ def draw_spectrum(data: xr.Dataset, asked: Problem) -> Figure:
     names = list(data["structure"].values)
     below = _TOP + len(names) * _ROW + 3.0
     figure = style.page(below + 66.0)
-    state = data["state"].values[-1]
+    state = data["state"].values[:2][-1]
     style.letter(figure, 1.0, 1.0, "a", f"Lowest modes {state}")
     for row, name in enumerate(names):
         top = _TOP + row * _ROW
@@ -93,12 +93,14 @@ def _mode(axes: Axes, data: xr.Dataset, mode: int, spacing: float) -> None:
 def _transmission(axes: Axes, data: xr.Dataset, asked: Problem) -> None:
     excited = data["excitation"].values
     for name in data["structure"].values:
-        curves = data["transmission"].sel(structure=name)
-        for state, dashes in zip(data["state"].values, ("-", (0, (3.0, 1.5))), strict=False):
-            mean = np.sqrt((curves.sel(state=state) ** 2).mean("case"))
+        squares = data["transmission"].sel(structure=name) ** 2
+        at_rest, loaded = squares.isel(state=[0]), squares.isel(state=slice(1, None))
+        drawn = [("at rest", at_rest, "-"), ("loaded", loaded, (0, (3.0, 1.5)))]
+        for state, curves, dashes in drawn if loaded.size else drawn[:1]:
             axes.plot(
-                excited, mean, color=style.STRUCTURE_COLOURS[name], linestyle=dashes,
-                label=name if len(data["state"]) == 1 else f"{name}, {state}", linewidth=0.8,
+                excited, np.sqrt(curves.mean(["state", "case"])),
+                color=style.STRUCTURE_COLOURS[name], linestyle=dashes, linewidth=0.8,
+                label=f"{name}, {state}" if loaded.size else name,
             )  # fmt: skip
     if asked.frequency is not None and excited[0] <= asked.frequency <= excited[-1]:
         axes.axvline(asked.frequency, color=style.GREY, linewidth=0.6, linestyle=":")

@@ -31,7 +31,7 @@ class Band(Section):
 
 
 class Spectrum(Section):
-    """Linear analysis about equilibria.
+    """Linear analysis about rest and, in a static study, about the full load of every load case.
 
     Attributes:
         modes: how many of the lowest of each structure.

@@ -58,6 +58,27 @@ def test_every_structure_about_every_equilibrium(analysed: Path) -> None:
     assert found["lateral_strain"].values == pytest.approx([0.0, -0.02], abs=1e-4)
 
 
+def test_every_load_case_has_its_equilibrium(design: Path, tmp_path: Path) -> None:
+    options(tmp_path)
+    path, out = tmp_path / "problem.yaml", tmp_path / "spectrum.nc"
+    path.write_text(path.read_text().replace("[180 deg]", "[180 deg, 0 deg]"))
+    words = ["--problem", str(path), "--design", str(design), "--out", str(out), "--quiet"]
+    assert run_stage("spectrum", words) == 0
+    found: xr.Dataset = datasets.read(out, "spectrum")
+    loaded = ["loaded, case 0 (180 deg)", "loaded, case 1 (0 deg)"]
+    assert found["state"].values.tolist() == ["at rest", *loaded]
+    pushed, pulled = (found.sel(state=name) for name in loaded)
+    assert pushed["equilibrium"].sel(dof="ux", unit=4).values == pytest.approx(-3.0)
+    assert pulled["equilibrium"].sel(dof="ux", unit=4).values == pytest.approx(3.0)
+    assert (abs(pulled["frequency"] / pushed["frequency"] - 1) > 1e-3).any("mode").all()
+    assert found["transmission"].sizes["case"] == 2
+    drawn = ["--problem", str(path), "--quiet", "--spectrum", str(out), "--out-dir", str(tmp_path)]
+    assert main(["spectrum", *drawn]) == 0
+    page = (tmp_path / "index.html").read_text()
+    assert "cloaked, loaded" in page
+    assert "Lowest modes loaded, case 0 (180 deg)" in page
+
+
 def test_what_cannot_be_analysed_is_told(design: Path, tmp_path: Path, failing: Failing) -> None:
     wrong = {
         "spectrum": ["--problem", str(write(tmp_path, HOLE, size=5, amplitude=3.0)), "--quiet"],
@@ -81,7 +102,7 @@ def test_the_page_holds_the_figure_and_its_curves(analysed: Path, tmp_path: Path
         pages.append({path.name: path.read_bytes() for path in out.iterdir()})
     assert pages[0] == pages[1]
     assert b"<svg" in pages[0]["index.html"]
-    assert pages[0]["modes.csv"].startswith(b"structure,state,mode,value\n")
+    assert pages[0]["modes.csv"].startswith(b"structure,state,mode,value_Hz\n")
     assert pages[0]["modes.csv"].count(b"\n") == 1 + 3 * 2 * 4
 
 
