@@ -1,7 +1,10 @@
 """Computes measurements from known constants, with noise."""
 
+import copy
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -15,9 +18,11 @@ from pipeline.calibration.inputs import (
     ForceDisplacement,
     FreeDecay,
     MeasurementSet,
+    source_files,
     start_constants,
 )
 from pipeline.datasets import provenance
+from pipeline.problem.fields import named_files
 from pipeline.problem.reading import yaml_file
 from pipeline.runtime import write_atomically
 from sim.core import Floats
@@ -67,19 +72,19 @@ def write_sets(asked: Calibration, path: Path, folder: Path) -> None:
         UserError: the folder cannot be written to.
     """
     assert asked.virtual is not None
-    data = dict(yaml_file.read_yaml(path).data)
-    sets = [dict(each) for each in data.pop("data")]
+    data = copy.deepcopy(dict(yaml_file.read_yaml(path).data))
+    for key, file in named_files(asked, path.parent).items():
+        _set_value(data, key.split("."), os.path.relpath(file, folder))
+    sets = data.pop("data")
     data.pop("virtual")
-    true = true_constants(asked)
+    true, files = true_constants(asked), source_files(asked, path.parent)
     for number, (each, raw) in enumerate(zip(asked.data, sets, strict=True)):
-        if "problem" in raw:
-            raw["problem"] = os.path.relpath(path.parent / raw["problem"], folder)
-        if each.virtual is None:
-            raw["file"] = os.path.relpath(path.parent / raw["file"], folder)
-        else:
+        if each.virtual is not None:
             del raw["virtual"]
             random = np.random.default_rng([asked.virtual.seed, number])
-            raw["file"] = _write_set(each, path, true, random, folder)
+            own = {key: file for key, file in files.items() if key.startswith(f"data.{number}.")}
+            parents = {"calibration": path, **own}
+            raw["file"] = _write_set(each, parents, true, random, folder)
     with write_atomically(folder / YAML) as aside:
         text = yaml.safe_dump(
             {**data, "synthetic": True, "data": sets}, sort_keys=False, allow_unicode=True
@@ -87,10 +92,22 @@ def write_sets(asked: Calibration, path: Path, folder: Path) -> None:
         aside.write_text(f"# {LABEL}\n{text}", encoding="utf-8")
 
 
+def _set_value(data: Any, keys: Sequence[str], value: str) -> None:  # noqa: ANN401
+    """Sets a value in nested mappings and lists, whose items go by their number."""
+    *above, last = keys
+    for key in above:
+        data = data[int(key)] if isinstance(data, list) else data[key]
+    data[last] = value
+
+
 def _write_set(
-    each: MeasurementSet, path: Path, true: Constants, random: np.random.Generator, folder: Path
+    each: MeasurementSet,
+    parents: Mapping[str, Path],
+    true: Constants,
+    random: np.random.Generator,
+    folder: Path,
 ) -> str:
-    """Writes a set, and returns the name of its file; `path` is the calibration's."""
+    """Writes a set, and returns the name of its file; of the `parents`, one is the calibration."""
     name = f"{each.name}.csv"
     if isinstance(each, ForceDisplacement):
         columns = (f"{each.columns.displacement} (mm)", f"{each.columns.force} (N)")
@@ -100,8 +117,8 @@ def _write_set(
         columns = (f"{each.columns.time} (s)", f"{each.columns.angle} (rad)")
         _write_csv(folder / name, columns, *simulate_decay(each, true, random))
         return name
-    origin = provenance.of_recording(each.model_dump_json(), {}, synthetic=True)
-    track = computed_track.simulate_track(each, path.parent, true, random)
+    origin = provenance.of_recording(each.model_dump_json(), parents, synthetic=True)
+    track = computed_track.simulate_track(each, parents["calibration"].parent, true, random)
     datasets.write(track, folder / f"{each.name}.nc", "track", origin)
     return f"{each.name}.nc"
 

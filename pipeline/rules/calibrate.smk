@@ -9,7 +9,7 @@ rule calibrate:
 
 rule calibrate_synthesise:
     input:
-        unpack(calibration_inputs.problems_of),
+        unpack(calibration_inputs.named_by),
         description="experiments/calibration/{calibration}.yaml",
     output:
         directory("results/calibration/{calibration}/data"),

@@ -11,7 +11,7 @@ from pipeline.calibration import (
     fit_calibration,
     simulation_fault,
 )
-from pipeline.calibration.inputs import Calibration
+from pipeline.calibration.inputs import Calibration, source_files
 from pipeline.datasets import provenance
 from pipeline.problem.reading import load_section
 from pipeline.runtime import UserError, sidecar_path, write_atomically
@@ -47,7 +47,7 @@ def _fit(path: Path, args: argparse.Namespace) -> None:
         raise simulation_fault(error, path) from error
     for line in filter(None, made.attrs["warnings"].split("\n")):
         LOG.warning("%s", line)
-    parents = {each.name: path.parent / each.file for each in asked.data if each.file is not None}
+    parents = source_files(asked, path.parent)
     origin = provenance.of_recording(
         asked.model_dump_json(), parents, synthetic=asked.synthetic, role="calibration"
     )

@@ -40,10 +40,8 @@ def work(args: argparse.Namespace) -> None:
     """
     asked = problem.load(args.problem, args.preset)
     asked = law_comparison.under(asked, "geometric") if args.geometric else asked
-    parents = {"design": args.design}
     if args.certificate is not None:
         asked = under_worst(asked, datasets.read(args.certificate, "certificate"))
-        parents["certificate"] = args.certificate
     design = read_design(asked, args.design)
     scene = scene_of(asked, args.problem.parent)
     structures = structures_of(scene, design)
@@ -52,8 +50,14 @@ def work(args: argparse.Namespace) -> None:
     except StoppedError as stopped:
         kept = _keep(asked, structures, stopped, args)
         raise stopped.explain(args.problem, kept) from stopped
-    origin = provenance.of_study(asked, "simulate", parents=parents, plan=plans)
+    origin = provenance.of_study(asked, "simulate", parents=_parents(args), plan=plans)
     datasets.write(made, args.out, "response", origin)
+
+
+def _parents(args: argparse.Namespace) -> dict[str, Path]:
+    """Lists the datasets that a command line names, by role."""
+    given = {"design": args.design, "certificate": args.certificate}
+    return {role: path for role, path in given.items() if path is not None}
 
 
 def _keep(
@@ -78,7 +82,7 @@ def _keep(
     except StoppedError as again:
         return _keep(asked, shorter, again, args)
     out: Path = args.out.with_name(f"{args.out.stem}_partial.nc")
-    origin = provenance.of_study(asked, "simulate", parents={"design": args.design}, plan=plans)
+    origin = provenance.of_study(asked, "simulate", parents=_parents(args), plan=plans)
     datasets.write(made, out, "response", origin)
     return out
 

@@ -2,12 +2,14 @@
 
 import argparse
 import logging
+from pathlib import Path
 
 from pipeline import datasets
 from pipeline.calibration import simulation_fault, study_cycles, study_pictures
 from pipeline.calibration.inputs import ELASTIC_NAMES, UNITS, KnownPictures, LoadCycles, Population
 from pipeline.calibration.population import draw_constants, validate_population
 from pipeline.datasets import provenance
+from pipeline.problem.fields import Section, named_files
 from pipeline.problem.reading import load_section
 from pipeline.runtime import write_atomically
 from sim.core import SimulationError
@@ -31,12 +33,10 @@ def work(args: argparse.Namespace) -> None:
 def _samples(args: argparse.Namespace) -> None:
     asked, folder = load_section(args.file, Population), args.file.parent
     made = validate_population(asked, folder)
-    parents = {each.name: folder / each.file for each in (*asked.data, asked.predict)}
-    tracks = [path for path in parents.values() if path.suffix == ".nc"]
+    read = (folder / each.file for each in (*asked.data, asked.predict))
+    tracks = [path for path in read if path.suffix == ".nc"]
     synthetic = any(datasets.read(path, "track").attrs["synthetic"] == "yes" for path in tracks)
-    origin = provenance.of_recording(
-        asked.model_dump_json(), parents, synthetic=synthetic, role="population"
-    )
+    origin = _origin(asked, folder, "population", synthetic=synthetic)
     datasets.write(made, args.out, "population", origin)
     LOG.info(
         "the measured curve lies %s the band of a new sample",
@@ -44,14 +44,22 @@ def _samples(args: argparse.Namespace) -> None:
     )
 
 
+def _origin(asked: Section, folder: Path, role: str, *, synthetic: bool = False) -> dict[str, str]:
+    """Records the provenance of what is made of a description and of all files that it names."""
+    parents = named_files(asked, folder)
+    return provenance.of_recording(asked.model_dump_json(), parents, synthetic=synthetic, role=role)
+
+
 def _constants(args: argparse.Namespace) -> None:
     asked = load_section(args.file, Population)
     drawn = draw_constants(asked, args.file.parent, args.count)
+    files = {args.file.name: args.file, **named_files(asked, args.file.parent)}
     source = asked.source
     lines = [
         f"# Constants of new samples, drawn from what {args.file.name} finds of those measured",
         f"# Measured by {source.by}. {source.reference}",
         f"# Licence: {source.licence}. Made by python -m pipeline validate constants",
+        *(f"# SHA-256 of {key}: {provenance.file_hash(path)}" for key, path in files.items()),
         ",".join(f"{name} ({UNITS[name]})" for name in ELASTIC_NAMES),
         *(",".join(f"{value:.5g}" for value in row) for row in drawn),
     ]
@@ -63,21 +71,12 @@ def _constants(args: argparse.Namespace) -> None:
 def _cycles(args: argparse.Namespace) -> None:
     asked, folder = load_section(args.file, LoadCycles), args.file.parent
     made = study_cycles(asked, folder)
-    parents = {each.name: folder / each.file for each in asked.records}
-    origin = provenance.of_recording(
-        asked.model_dump_json(), parents, synthetic=False, role="load_cycles"
-    )
-    datasets.write(made, args.out, "load_cycles", origin)
+    datasets.write(made, args.out, "load_cycles", _origin(asked, folder, "load_cycles"))
     LOG.info("%d snaps in %d records", made.sizes["snap"], made.sizes["record"])
 
 
 def _pictures(args: argparse.Namespace) -> None:
     asked, folder = load_section(args.file, KnownPictures), args.file.parent
     made = study_pictures(asked, folder)
-    parents = {"rigid_parts": folder / asked.rigid_parts.folder}
-    parents["specimen"] = folder / asked.specimen.file
-    origin = provenance.of_recording(
-        asked.model_dump_json(), parents, synthetic=False, role="pictures"
-    )
-    datasets.write(made, args.out, "pictures", origin)
+    datasets.write(made, args.out, "pictures", _origin(asked, folder, "pictures"))
     LOG.info("%d of %d units found", int(made["seen"].sum()), made.sizes["unit"])

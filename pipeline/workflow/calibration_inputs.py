@@ -8,7 +8,8 @@ from pathlib import Path
 
 from snakemake.iocontainers import Wildcards
 
-from pipeline.calibration.inputs import Calibration, TrackedMotion
+from pipeline.calibration.inputs import Calibration, source_files
+from pipeline.problem.fields import named_files
 from pipeline.problem.reading import load_section
 from pipeline.runtime import WORK, UserError
 
@@ -26,18 +27,20 @@ def measurements(wildcards: Wildcards) -> dict[str, str]:
     asked = _described(source)
     if asked is not None and asked.virtual is not None:
         folder = f"results/calibration/{wildcards.calibration}/data"
-        return {"folder": folder, **problems_of(wildcards)}
-    sets = asked.data if asked is not None else ()
-    named = {each.name: f"{_FOLDER}/{each.file}" for each in sets if each.file is not None}
-    return {"description": source, **named, **problems_of(wildcards)}
+        return {"folder": folder, **named_by(wildcards)}
+    return {"description": source, **named_by(wildcards)}
 
 
-def problems_of(wildcards: Wildcards) -> dict[str, str]:
-    """Lists the problems of the studies that tracks are of, each by the name of its set."""
+def named_by(wildcards: Wildcards) -> dict[str, str]:
+    """Lists the files that a calibration names, and those that the problems of its tracks name."""
     asked = _described(f"{_FOLDER}/{wildcards.calibration}.yaml")
-    sets = asked.data if asked is not None else ()
-    tracks = [each for each in sets if isinstance(each, TrackedMotion)]
-    return {f"problem_{each.name}": f"{_FOLDER}/{each.problem}" for each in tracks}
+    if asked is None:
+        return {}
+    try:
+        found = source_files(asked, Path(_FOLDER))
+    except UserError:  # of a problem, of which the stage will tell
+        found = named_files(asked, Path(_FOLDER))
+    return {key.replace(".", "_"): file.as_posix() for key, file in found.items()}
 
 
 def description(wildcards: Wildcards) -> str:

@@ -12,7 +12,7 @@ from pipeline.calibration.inputs.computed_measurements import (
     VirtualForces,
     VirtualTrack,
 )
-from pipeline.problem.fields import Count, Force, Length, Section, exactly_one, fault
+from pipeline.problem.fields import Count, File, Force, Length, Section, exactly_one, fault
 from pipeline.problem.sections import Contact, Lattice, MaterialConstants
 
 ConstantName = Literal[
@@ -26,7 +26,6 @@ ConstantName = Literal[
 ]
 
 TestKind = Literal["tension", "compression", "shear"]
-File = Annotated[str, Field(min_length=1)]
 Label = Annotated[str, StringConstraints(pattern=r"^\w+$")]
 
 

@@ -2,13 +2,14 @@
 
 from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, StringConstraints, model_validator
 
-from pipeline.calibration.inputs.description import File
 from pipeline.calibration.inputs.population import MeasurementSource
-from pipeline.problem.fields import Length, Section, fault
+from pipeline.problem.fields import File, Length, Section, fault
 from pipeline.problem.sections import Lattice
 
+Inside = Annotated[str, StringConstraints(pattern=r"^[^/\\]+$")]
+"""Name of a file in a folder."""
 Pixels = Annotated[float, Field(ge=0.0, le=1e5)]
 Point = tuple[Pixels, Pixels]
 
@@ -42,9 +43,9 @@ class RigidParts(Section):
 
     source: MeasurementSource
     folder: File
-    first: File
+    first: Inside
     parts: Annotated[tuple[RigidPart, ...], Field(min_length=1)]
-    reference: File
+    reference: Inside
     columns: tuple[str, str, str, str, str] = ("frame", "part", "u_px", "v_px", "rotation_rad")
 
     @model_validator(mode="after")

@@ -4,9 +4,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from pipeline.calibration.inputs.description import File, ForceColumns, Label
+from pipeline.calibration.inputs.description import ForceColumns, Label
 from pipeline.calibration.inputs.population import MeasurementSource
-from pipeline.problem.fields import Gap, Section
+from pipeline.problem.fields import File, Gap, Section
 from pipeline.problem.sections import Contact, Lattice, MaterialConstants
 
 Unit = Annotated[int, Field(ge=0, strict=True)]

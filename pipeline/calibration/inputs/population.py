@@ -5,13 +5,12 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from pipeline.calibration.inputs.description import (
-    File,
     ForceColumns,
     Label,
     RecordOptions,
     TestKind,
 )
-from pipeline.problem.fields import Count, Length, Positive, Samples, Section, fault
+from pipeline.problem.fields import Count, File, Length, Positive, Samples, Section, fault
 from pipeline.problem.sections import Lattice, MaterialConstants
 
 

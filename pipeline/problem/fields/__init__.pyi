@@ -1,5 +1,7 @@
 from . import csv_columns as csv_columns
 from . import units as units
+from .file_keys import File as File
+from .file_keys import named_files as named_files
 from .quantities import FOLDER as FOLDER
 from .quantities import SIM_UNITS as SIM_UNITS
 from .quantities import Angle as Angle

@@ -17,6 +17,7 @@ from pipeline.problem.fields import (
     Angle,
     Delay,
     Duration,
+    File,
     Force,
     Frequency,
     Length,
@@ -304,7 +305,7 @@ class TimeSeriesDrive(_Drive):
     """
 
     kind: Literal["time_series"]
-    file: Annotated[str, StringConstraints(min_length=1)]
+    file: File
     sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")] | None = None
 
     @property

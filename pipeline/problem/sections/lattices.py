@@ -15,14 +15,22 @@ from pydantic import (
     AfterValidator,
     Discriminator,
     Field,
-    StringConstraints,
     Tag,
     ValidationInfo,
     model_validator,
 )
 from pydantic.json_schema import SkipJsonSchema
 
-from pipeline.problem.fields import FOLDER, SIM_UNITS, Angle, Coordinate, Length, Section, fault
+from pipeline.problem.fields import (
+    FOLDER,
+    SIM_UNITS,
+    Angle,
+    Coordinate,
+    File,
+    Length,
+    Section,
+    fault,
+)
 from pipeline.problem.outlines import NetworkContent, Stiffness, read_network
 from pipeline.runtime import UserError
 from sim.structure import honeycomb, kagome, listed, quads, triangular
@@ -264,7 +272,7 @@ class ListedNetwork(_WithNetwork):
     """
 
     kind: Literal["file"]
-    file: Annotated[str, StringConstraints(min_length=1)]
+    file: File
     spacing: Length
     polygons: SkipJsonSchema[tuple[tuple[Point, ...], ...] | None] = None
     ligaments: SkipJsonSchema[tuple[tuple[Point, Point], ...] | None] = None

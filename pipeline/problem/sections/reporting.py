@@ -8,6 +8,7 @@ from pipeline.problem.fields import (
     Coordinate,
     Count,
     Delay,
+    File,
     Gap,
     Modulus,
     Positive,
@@ -60,7 +61,7 @@ class MeasuredConstants(Section):
         samples: draws that are simulated, spread evenly over the file.
     """
 
-    file: Annotated[str, Field(min_length=1)]
+    file: File
     samples: Samples = 100
 
 

@@ -15,6 +15,7 @@ from pipeline.problem.fields import (
     SIM_UNITS,
     Angle,
     Coordinate,
+    File,
     Gap,
     Length,
     Section,
@@ -231,7 +232,7 @@ class Image(Section):
         orientation: by which it is turned, counter-clockwise.
     """
 
-    file: Annotated[str, StringConstraints(min_length=1)]
+    file: File
     threshold: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
     invert: bool = False
     size: tuple[Length, Length] | None = None
