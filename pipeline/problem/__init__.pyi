@@ -7,6 +7,7 @@ from .model import Problem as Problem
 from .reading import load as load
 from .sections import selected_units as selected_units
 from .stage_outputs import Output as Output
+from .stage_outputs import check_measured_constants as check_measured_constants
 from .stage_outputs import outputs as outputs
 from .stage_outputs import over_measured_constants as over_measured_constants
 from .unit_roles import cloak_units as cloak_units

@@ -46,6 +46,21 @@ _DIMENSIONS = {
 }
 
 
+def check_measured_constants(asked: Problem, folder: Path) -> None:
+    """Reads the measured constants that a problem names, if it names any.
+
+    Raises:
+        UserError: their file cannot be used.
+    """
+    if asked.report.measured_constants is None:
+        return
+    try:
+        over_measured_constants(asked, folder)
+    except UserError as error:
+        error.key = error.key or "report.measured_constants.file"
+        raise
+
+
 def over_measured_constants(asked: Problem, folder: Path) -> Problem:
     """Replaces the sweep of a problem by one over the measured constants that its report names.
 

@@ -14,7 +14,13 @@ from tempfile import NamedTemporaryFile
 
 from snakemake.iocontainers import Wildcards
 
-from pipeline.problem import Problem, outputs, over_measured_constants, section_hash
+from pipeline.problem import (
+    Problem,
+    check_measured_constants,
+    outputs,
+    over_measured_constants,
+    section_hash,
+)
 from pipeline.problem.sections import design_name, group_count, split_name
 from pipeline.problem.sections import designs as designs_section
 from pipeline.runtime import RUN_MARK, WORK, UserError
@@ -127,22 +133,10 @@ def check_problems(words: Collection[str]) -> None:
             check_calibrations()
         for study in asked_for(words) or studies()[:1]:
             check_names(study)
-            _check_constants(study)
+            check_measured_constants(problem_of(study), WORK / "experiments" / study.name)
         check_products(words)
     except UserError as error:
         sys.exit(f"error: {error}")
-
-
-def _check_constants(study: Study) -> None:
-    """Reads the problem of a study, and the measured constants that it names."""
-    problem = problem_of(study)
-    if problem.report.measured_constants is None:
-        return
-    try:
-        over_measured_constants(problem, WORK / "experiments" / study.name)
-    except UserError as error:
-        error.key = error.key or "report.measured_constants.file"
-        raise
 
 
 def check_room(folder: str) -> None:

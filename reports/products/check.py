@@ -37,10 +37,11 @@ def report(args: argparse.Namespace) -> None:
     """Draws ``check.png`` and says the rest, a line each; what the scene itself warns of is logged.
 
     Raises:
-        UserError: the problem has a fault.
+        UserError: the problem has a fault, or the file of measured constants that it names.
     """
     asked = problem.load(args.problem, args.preset)
     scene = scene_of(asked, args.problem.parent)
+    problem.check_measured_constants(asked, args.problem.parent)
     told = [cost_line(asked, scene), *(f"warning: {line}" for line in doubts(asked, scene))]
     with style.styled():
         figure = style.page(SIDE + 22.0, SIDE)

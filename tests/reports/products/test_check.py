@@ -34,6 +34,17 @@ def test_a_picture_and_a_line_of_cost(tmp_path: Path, capsys: pytest.CaptureFixt
         assert min(picture.size) > 500
 
 
+def test_measured_constants_are_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    named = "report: { measured_constants: { file: constants.csv, samples: 2 } }\n"
+    path = static.write(tmp_path, static.HOLE + named, size=5, amplitude=3.0)
+    (tmp_path / "constants.csv").write_text("axial_stiffness (N/mm)\n120\n119\n")
+    assert main(["check", "--problem", str(path), "--out-dir", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert "columns are missing" in told
+    assert "constants.csv" in told
+    assert "key:    report.measured_constants.file" in told
+
+
 def test_descents_and_imperfect_copies_take_time(tmp_path: Path) -> None:
     path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
     more = "law: geometric", "optimiser: { angle: { evaluations: 3 }, descents: 2,"
