@@ -7,7 +7,7 @@ from pathlib import Path
 from pipeline import datasets
 from pipeline.calibration import simulation_fault, study_cycles, study_pictures
 from pipeline.calibration.inputs import ELASTIC_NAMES, UNITS, KnownPictures, LoadCycles, Population
-from pipeline.calibration.population import draw_constants, validate_population
+from pipeline.calibration.population import BEYOND, draw_constants, validate_population
 from pipeline.datasets import provenance
 from pipeline.problem.fields import Section, named_files
 from pipeline.problem.reading import load_section
@@ -15,6 +15,12 @@ from pipeline.runtime import write_atomically
 from sim.core import SimulationError
 
 LOG = logging.getLogger(__name__)
+
+_DRAWN = {
+    "emulator_beyond": "the samples' constants",
+    "emulator_beyond_predicted": "new samples' constants",
+}
+"""Shares of draws that the emulated curves do not reach."""
 
 
 def work(args: argparse.Namespace) -> None:
@@ -38,6 +44,9 @@ def _samples(args: argparse.Namespace) -> None:
     synthetic = any(datasets.read(path, "track").attrs["synthetic"] == "yes" for path in tracks)
     origin = _origin(asked, folder, "population", synthetic=synthetic)
     datasets.write(made, args.out, "population", origin)
+    for name, what in _DRAWN.items():
+        if beyond := made[name].item():
+            LOG.warning(BEYOND, 100 * beyond, what)
     LOG.info(
         "the measured curve lies %s the band of a new sample",
         "inside" if made["inside"].item() else "outside",

@@ -42,6 +42,18 @@ class CurveEmulator(NamedTuple):
         return np.asarray(spline(displacement))
 
 
+def share_beyond(centre: Numbers, logs: Numbers) -> float:
+    """Computes the share of constants whose ratios are beyond REACH, at whose bounds forces stay.
+
+    Args:
+        centre: (2,) of the logarithms of the ratios, an emulator's own.
+        logs: (..., 3) of the constants.
+    """
+    low, high = np.array(REACH).T
+    ratios = np.asarray(logs)[..., [0, 2]] - np.asarray(logs)[..., 1:2] - np.asarray(centre)
+    return float(((ratios < low) | (ratios > high)).any(axis=-1).mean())
+
+
 def log_force(weights: Numbers, centre: Numbers, base: Numbers, logs: Numbers) -> Array:
     """Computes logarithms (..., n) of forces in N, at each order k by cos(k arccos x).
 

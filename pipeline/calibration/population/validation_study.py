@@ -1,5 +1,6 @@
 """Fits a population of samples, predicts another sample's test, and judges the prediction."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -11,7 +12,12 @@ import xarray as xr
 from numpyro.diagnostics import gelman_rubin
 
 from pipeline.calibration.inputs import ELASTIC_NAMES, Constants, Population, TestKind
-from pipeline.calibration.population.curve_emulator import CurveEmulator, emulate, log_force
+from pipeline.calibration.population.curve_emulator import (
+    CurveEmulator,
+    emulate,
+    log_force,
+    share_beyond,
+)
 from pipeline.calibration.population.hierarchical_model import (
     FACTORS,
     Draws,
@@ -48,6 +54,13 @@ from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from sim.core import Floats, Numbers
 
+LOG = logging.getLogger(__name__)
+
+BEYOND = (
+    "%.2g %% of the draws of %s have ratios of stiffness beyond the simulated ones, at whose bounds"
+    " their forces stay: give material values nearer to the samples', or narrower priors"
+)
+"""Warning of a share of draws, and of what they are."""
 POINTS = 18
 """Of the prediction, evenly spaced."""
 QUANTILES = (0.025, 0.5, 0.975)
@@ -89,15 +102,18 @@ def validate_population(asked: Population, folder: Path) -> xr.Dataset:
     curve = pose_curve(predicted, at, kinds.index(asked.predict.test))
     middle, centre = medians(posteriors[""]), begin.logs(ELASTIC_NAMES)
     bands: dict[str, PredictionBand] = {"student": student_band(curve, middle["constants"])}
+    drawn: dict[str, Draws] = {}
     for name, given in (("", asked.priors), ("doubled", asked.priors.doubled)):
-        drawn = redraw_population(posteriors[name], prior_numbers(given, centre), random)
-        bands[name] = find_band(new_curves(curve, drawn, random))
+        drawn[name] = redraw_population(posteriors[name], prior_numbers(given, centre), random)
+        bands[name] = find_band(new_curves(curve, drawn[name], random))
     truth = np.log(np.interp(at, shown.displacement, shown.force))
     ranked = _ranked(found, begin, curve, truth - bands[""].median)
     priors = prior_numbers(asked.priors, centre)
     covered = try_band(readings, priors, curve, middle, asked.sampling)
     variables = {
         **_constants(found),
+        "emulator_beyond": ((), share_beyond(predicted.centre, posteriors[""]["constants"])),
+        "emulator_beyond_predicted": ((), share_beyond(predicted.centre, _new_samples(drawn[""]))),
         **_predictions(found, curve, bands, truth, folder),
         **_mechanisms(ranked),
         **_left_out(found, random),
@@ -141,10 +157,17 @@ def draw_constants(asked: Population, folder: Path, count: int) -> Floats:
     seen = readings._replace(used=used, log_force=log_force)
     effort = asked.sampling
     draws = sample_posteriors(seen, lanes, warm_up=effort.warm_up, draws=effort.draws)
-    mean, spread = (draws[name].reshape(-1, 3) for name in ("mean", "spread"))
-    chosen = np.linspace(0, len(mean) - 1, count).round().astype(int)
+    if beyond := share_beyond(readings.ratios, draws["constants"]):
+        LOG.warning(BEYOND, 100 * beyond, "the samples' constants")
+    flat = {name: draws[name].reshape(-1, 3) for name in ("mean", "spread")}
+    chosen = np.linspace(0, len(flat["mean"]) - 1, count).round().astype(int)
+    return np.exp(_new_samples({name: each[chosen] for name, each in flat.items()}))
+
+
+def _new_samples(draws: Draws) -> Floats:
+    """Draws logarithms (n, 3) of the constants of new samples, one of each draw (n, 3)."""
     random = np.random.default_rng(0)
-    return np.exp(mean[chosen] + spread[chosen] * random.normal(size=(count, 3)))
+    return np.asarray(draws["mean"] + draws["spread"] * random.normal(size=draws["mean"].shape))
 
 
 def _emulated(

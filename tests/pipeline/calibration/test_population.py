@@ -42,6 +42,27 @@ def emulator(asked: Population, centre: Constants) -> CurveEmulator:
     return curve_emulator.emulate(asked.lattice, "compression", centre, 3.75)
 
 
+def test_constants_beyond_the_simulated_ratios_are_counted(centre: Constants) -> None:
+    middle = centre.logs(ELASTIC_NAMES)
+    ratios = middle[[0, 2]] - middle[1]
+    (_, axial), (bending, _) = curve_emulator.REACH
+    inside = middle + np.array([axial - 0.1, 0.0, bending + 0.1])
+    assert curve_emulator.share_beyond(ratios, inside[None]) == 0.0
+    others = inside + np.array([[0.2, 0.0, 0.0], [0.0, 0.0, -0.2], [0.3, 0.3, 0.3], [0, 0, 1]])
+    assert curve_emulator.share_beyond(ratios, others) == 0.5
+    flat = np.ones((2, 1, *(order + 1 for order in curve_emulator.ORDERS)))
+    base = np.zeros(1)
+    stays = [
+        float(
+            curve_emulator.log_force(
+                flat[0], ratios, base, middle + np.array([axial + more, 0, 0])
+            )[0]
+        )
+        for more in (0.1, 1.0)
+    ]
+    assert stays[0] == pytest.approx(stays[1])
+
+
 def curves(*factors: float) -> list[SampleCurve]:
     """Made of a square root, times a factor each, and their mean."""
     way = np.linspace(0.0, 3.75, 76)
