@@ -10,6 +10,7 @@ rule robust_gains:
         designs=lambda wildcards, input: [
             f"{name}={path}" for name, path in input.items()
         ],
+        titles=rule_inputs.robust_titles,
         source=source_hash("pipeline.stages.robust_gains"),
     message:
         "Evaluating what the robust presets of {wildcards.name} gain"

@@ -212,6 +212,11 @@ def robust_designs(wildcards: Wildcards) -> dict[str, str]:
     return {"plain": f"results/{wildcards.name}/design.nc", **named}
 
 
+def robust_titles(wildcards: Wildcards) -> str:
+    """Joins the titles of these presets, which stand in the dataset: no design depends on them."""
+    return "\n".join(problem_of(study).title for study in robust_presets(wildcards.name))
+
+
 def front_designs(wildcards: Wildcards) -> dict[str, str]:
     """Lists the designs of presets that ask for several under loads in ranges."""
     members = [each for group in presets_in_ranges(wildcards.name).values() for each in group]

@@ -15,7 +15,7 @@ from pipeline.runtime import ROOT
 
 STAGES = """
 design select simulate as_built virtual_specimen sweep monte_carlo verify redesign
-film track compare
+film track compare robust_gains
 """
 
 SERVER = """

@@ -135,6 +135,15 @@ def test_edits_rerun_dependents(built: Sandbox, old: str, new: str, rerun: dict[
     assert built.planned("fig2") == rerun
 
 
+def test_gains_have_the_titles_of_today(built: Sandbox) -> None:
+    gains = "results/fig2/gains.nc"
+    ended = built.run(gains)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert built.planned(gains) == {}
+    built.edit("Shielding with units and ligaments as they come out", "Another title")
+    assert built.planned(gains) == {"robust_gains": 1}
+
+
 def test_edited_source_reruns_what_imports_it(built: Sandbox) -> None:
     module = built.root / "reports/figures/study_report.py"
     module.write_text(module.read_text() + "\n")
