@@ -27,7 +27,7 @@ from .robust_scene import greatest_loss as greatest_loss
 from .robust_scene import load_family as load_family
 from .robust_scene import under_worst as under_worst
 from .robust_scene import worst_load as worst_load
-from .start_design import shipped_vector as shipped_vector
+from .start_design import closest_vector as closest_vector
 from .start_design import start_vector as start_vector
 from .structure_variables import CLAMPED as CLAMPED
 from .structure_variables import DRIVEN as DRIVEN

@@ -19,7 +19,7 @@ _SAME = 1e-9  # mm
 _STARTS = {"study": "study's own", "previous": "previous"}
 
 
-def shipped_vector(design: xr.Dataset) -> Floats:
+def _shipped_vector(design: xr.Dataset) -> Floats:
     """Reads the design vector (n_variables,) of a design."""
     history = design.sel({"method": design.attrs["shipped_method"]})
     best = int(history["best_evaluation"])
@@ -53,7 +53,12 @@ def start_vector(asked: Problem, scene: Scene, path: Path | None, source: Path) 
         what = f"the {_STARTS[kind]} design is of another lattice or void"
         remedy = "keep lattice and void, or start from the initial lattice"
         raise UserError(what, file=source, key="optimiser.start", value=kind, remedy=remedy)
-    there, vector = flat_vertices(scene.lattice, design["vertices"]), shipped_vector(design)
+    return closest_vector(scene, design)
+
+
+def closest_vector(scene: Scene, design: xr.Dataset) -> Floats:
+    """Finds the design vector (n_variables,) of a design, or the closest that a scene allows."""
+    there, vector = flat_vertices(scene.lattice, design["vertices"]), _shipped_vector(design)
     if len(vector) != scene.space.n_variables or _distance(scene, vector, there) > _SAME:
         vector = _closest(scene, design, there)
         LOG.info("started %.3g mm off the design", _distance(scene, vector, there))

@@ -81,7 +81,8 @@ def scene_of(
     """Poses the scene of a problem whose files lie in ``folder``, or with other ``motions``.
 
     Raises:
-        UserError: the file of a measured drive cannot be read, or the scene has no meaning.
+        UserError: the file of a measured drive cannot be read, the scene has no meaning, or not the
+            symmetry that its designs are to have.
     """
     made = motions_of(problem, folder) if motions is None else motions
     intact, altered = lattice_of(problem), altered_lattice_of(problem)
@@ -124,7 +125,18 @@ def scene_of(
     except SceneError as error:
         what, _, remedy = str(error).partition("; ")
         raise UserError(what, key=error.key, remedy=remedy) from error
+    _check_symmetry(posed)
     return posed
+
+
+def _check_symmetry(scene: Scene) -> None:
+    if (asked := scene.design.symmetry) == "none":
+        return
+    try:
+        _ = scene.space
+    except ValueError as error:
+        remedy = "ask for none, or for one that lattice and cloak have"
+        raise UserError(str(error), key="optimiser.symmetry", value=asked, remedy=remedy) from error
 
 
 def _loads(

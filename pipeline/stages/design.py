@@ -60,7 +60,6 @@ def work(args: argparse.Namespace) -> None:
         remedy = "name one by its number, as in --preset 1"
         raise UserError(what, file=args.problem, key="designs", remedy=remedy)
     scene = design_scene(asked, args.problem.parent)
-    _check_symmetry(scene, args.problem)
     start = start_vector(asked, scene, args.start, args.problem)
     plan = _plan(scene, args)
     results = [
@@ -112,19 +111,6 @@ def _descend(
     result = optimise(asked, scene, plan, args.method, source, results, start)
     LOG.info("stopped: %s; loss %.5g", result.reason, result.loss)
     return result
-
-
-def _check_symmetry(scene: Scene, source: Path) -> None:
-    try:
-        _ = scene.space
-    except ValueError as error:
-        raise UserError(
-            str(error),
-            file=source,
-            key="optimiser.symmetry",
-            value=scene.design.symmetry,
-            remedy="ask for none, or for one that lattice and cloak have",
-        ) from error
 
 
 def optimise(

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
-from pipeline.posing import design_scene, law_comparison, read_design, shipped_vector
+from pipeline.posing import closest_vector, design_scene, law_comparison, read_design
 from pipeline.problem import Problem
 from pipeline.problem.sections import Method, Methods
 from pipeline.stages.design import design_dataset, optimise
@@ -39,7 +39,7 @@ def work(args: argparse.Namespace) -> None:
     scene = design_scene(posed, args.problem.parent)
     plan = make_plan(scene, threads=args.threads)
     LOG.info("%s", plan.describe())
-    start = None if np.isnan(distance) else shipped_vector(design)
+    start = None if np.isnan(distance) else closest_vector(scene, design)
     result = optimise(posed, scene, plan, METHOD, args.problem, args.out.parent, start)
     LOG.info("stopped: %s", result.reason)
     made = join({METHOD: design_dataset(posed, scene, result)}, METHOD)

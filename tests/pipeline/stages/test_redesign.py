@@ -8,6 +8,7 @@ from pipeline import datasets, problem
 from pipeline.__main__ import run_stage
 from pipeline.posing import law_comparison
 from pipeline.problem.sections import Method
+from tests.pipeline.conftest import Failing
 from tests.pipeline.static import GEOMETRIC as BUDGET
 
 
@@ -56,6 +57,32 @@ def test_a_design_that_cannot_be_simulated_is_begun_anew(study: Path, tmp_path: 
     second, moved = reconsidered(study, tmp_path, np.nan)
     altered = moved["loss"].sel(structure="altered").item()
     assert float(second["loss"][0, 0]) == pytest.approx(altered, rel=1e-6)
+
+
+def changed(study: Path, folder: Path, optimiser: str) -> list[str]:
+    """Words for another problem of the study's design and response."""
+    text = (study / "problem.yaml").read_text(encoding="utf-8")
+    path = folder / "problem.yaml"
+    path.write_text(text.replace("optimiser: {", f"optimiser: {{ {optimiser},"), encoding="utf-8")
+    made = ["--design", str(study / "design.nc"), "--out", str(folder / "made.nc")]
+    return ["--problem", str(path), "--quiet", *made]
+
+
+def test_a_design_made_without_turning_slots_is_taken_as_it_is(study: Path, tmp_path: Path) -> None:
+    words = changed(study, tmp_path, "as_built: true")
+    assert run_stage("redesign", [*words, "--response", str(study / "response.nc")]) == 0
+    second = datasets.read(tmp_path / "made.nc", "design")
+    first = datasets.read(study / "design.nc", "design")
+    np.testing.assert_allclose(second["vertices"], first["vertices"], atol=1e-9)
+    np.testing.assert_allclose(second["end_angles"].fillna(0.0), 0.0, atol=1e-9)
+
+
+def test_a_symmetry_that_the_lattice_has_not_is_told(
+    study: Path, tmp_path: Path, failing: Failing
+) -> None:
+    words = changed(study, tmp_path, "symmetry: mirror_y")
+    for stage, more in (("simulate", []), ("redesign", ["--response", study / "response.nc"])):
+        assert "key:    optimiser.symmetry" in failing(stage, [*words, *map(str, more)])
 
 
 def test_the_budget_enters_the_hash_of_this_stage_only(study: Path) -> None:
