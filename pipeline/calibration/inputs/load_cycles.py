@@ -1,12 +1,12 @@
 """Describes records of load cycles, and the path that a simulated unit is driven along."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pipeline.calibration.inputs.description import ForceColumns, Label
 from pipeline.calibration.inputs.population import MeasurementSource
-from pipeline.problem.fields import File, Gap, Section
+from pipeline.problem.fields import File, Gap, Section, fault
 from pipeline.problem.sections import Contact, Lattice, MaterialConstants
 
 Unit = Annotated[int, Field(ge=0, strict=True)]
@@ -52,6 +52,17 @@ class CycleRecord(Section):
     contact: Contact | None = None
     play: Gap = 0.0
     known: File | None = None
+
+    @model_validator(mode="after")
+    def _simulated(self) -> Self:
+        if self.contact is not None and self.contact.law != "angle":
+            remedy = "give contact of law: angle, or none"
+            raise fault("contact by the law of distance is not known here", remedy, "contact")
+        for name in ("contact", "known"):
+            if self.material is None and getattr(self, name) is not None:
+                what = f"{name} is of the simulation, and there is none without material"
+                raise fault(what, "give material, or leave it out", name)
+        return self
 
 
 class LoadCycles(Section):

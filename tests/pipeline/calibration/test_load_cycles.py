@@ -1,9 +1,11 @@
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
+import yaml
 
 from pipeline import datasets
 from pipeline.calibration import load_cycle_study, study_cycles
@@ -11,7 +13,7 @@ from pipeline.calibration.experiments import force_displacement, load_cycles
 from pipeline.calibration.inputs import ForceDisplacement, LoadCycles, RecordOptions
 from pipeline.calibration.load_cycle_study import follow_cycle, measure_cycle
 from pipeline.problem.fields import csv_columns
-from pipeline.problem.reading import load_section
+from pipeline.problem.reading import load_section, overlay_keys
 from pipeline.runtime import ROOT, UserError
 from sim.energy import observe
 from sim.quasistatics import EquilibriumTrace, StaticRecord, StaticSolver, trace, trace_first_snap
@@ -31,6 +33,28 @@ def cycles(count: int = 3, slack: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     stiff = np.where(rises, 3.0, 2.0)
     stiff[:81] *= 1.1
     return way, stiff * np.maximum(way - slack, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"contact": {"law": "geometric"}}, "contact by the law of distance is not known here"),
+        ({"material": None}, "contact is of the simulation, and there is none without material"),
+        ({"material": None, "contact": None}, "known is of the simulation"),
+    ],
+)
+def test_what_no_simulation_takes_is_refused(
+    changed: dict[str, Any], told: str, tmp_path: Path
+) -> None:
+    data = yaml.safe_load((FOLDER / "morpher.yaml").read_text())
+    for section in (data["lattice"], data["drive"]):
+        section["file"] = str(FOLDER / section["file"])
+    (tmp_path / "morpher.yaml").write_text(yaml.safe_dump(data))
+    load_section(tmp_path / "morpher.yaml", LoadCycles)
+    data["records"][0] = overlay_keys(data["records"][0], changed)
+    (tmp_path / "morpher.yaml").write_text(yaml.safe_dump(data))
+    with refused(told):
+        load_section(tmp_path / "morpher.yaml", LoadCycles)
 
 
 def test_branches_and_loops_of_a_record() -> None:
