@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.tracking.frames import video
+from pipeline.tracking.frames import has_uneven_intervals
 from pipeline.tracking.motion import frame_timing, uncertainty, video_tracking
 from sim.core import Floats
 
@@ -50,8 +50,8 @@ def test_a_varying_rate_is_no_row_of_gaps_nor_of_rounded_stamps() -> None:
     clock = np.cumsum(np.random.default_rng(3).choice([1.0, 1.5, 2.0, 3.0], FRAMES))
     assert faults(motion(clock), clock / 60) == {}
     steady = np.arange(FRAMES) / 30
-    assert not video.has_uneven_intervals(np.round(steady, 3))
-    assert video.has_uneven_intervals(np.delete(steady, [7, 30]))
+    assert not has_uneven_intervals(np.round(steady, 3))
+    assert has_uneven_intervals(np.delete(steady, [7, 30]))
 
 
 def test_a_picture_is_the_same_but_for_a_codec() -> None:
