@@ -20,7 +20,7 @@ from sim.core import Floats
 
 _LEFT, _PITCH, _WIDTH, _HEIGHT = 13.0, 59.0, 44.0, 38.0
 _TOP, _ROW = 9.0, 50.0
-_MAP_WIDTH, _BAR = 36.0, 2.2
+_MAP_LEFT, _MAP_WIDTH, _BAR = 15.0, 34.5, 2.2
 _MANY = 500  # points, above which they are drawn as pixels: a page has to open
 _BINS, _FEWEST = 10, 200  # of medians; below so many cases there are none
 
@@ -29,22 +29,27 @@ class SweepMeasure(NamedTuple):
     """Holds what is shown of every case: values (case) of structures, by colour."""
 
     title: str
-    label: str
+    quantity: str
+    unit: str  # empty if it has none
     values: dict[str, Floats]
     level: float | None = None
+
+    @property
+    def label(self) -> str:
+        """Names the quantity with its unit."""
+        return f"{self.quantity} ({self.unit})" if self.unit else self.quantity
 
 
 def measures(data: xr.Dataset) -> list[SweepMeasure]:
     """Tells what a sweep gathers, in the order of the panels."""
-    units = data["loss"].attrs["units"]
-    loss = "Loss $J$" if units == "1" else f"Loss $J$ ({units})"
+    units = data["loss"].attrs["units"].removeprefix("1")
     both = {style.ALTERED: data["loss_altered"].values, style.CLOAKED: data["loss"].values}
     void = np.degrees(data["min_void_angle"].values)
     ratio, over = {style.CLOAKED: cases.ratio(data)}, "$J$ / $J$ altered"
     return [
-        SweepMeasure("Loss", loss, both),
-        SweepMeasure("Loss, cloaked over altered", over, ratio, 1.0),
-        SweepMeasure("Smallest void angle, cloaked", "Void angle (°)", {style.CLOAKED: void}),
+        SweepMeasure("Loss", "Loss $J$", units, both),
+        SweepMeasure("Loss, cloaked over altered", over, "", ratio, 1.0),
+        SweepMeasure("Smallest void angle, cloaked", "Void angle", "°", {style.CLOAKED: void}),
     ]
 
 
@@ -125,7 +130,7 @@ def _name(axes: Axes, axis: SweepAxis, which: str) -> None:
 def _maps(data: xr.Dataset, along: Sequence[SweepAxis], shown: Sequence[SweepMeasure]) -> Figure:
     figure = style.page(_TOP + _ROW)
     for column, measure in enumerate(shown):
-        left = _LEFT + column * _PITCH
+        left = _MAP_LEFT + column * _PITCH
         title = "Loss, cloaked" if len(measure.values) > 1 else measure.title
         style.letter(figure, 1.0 + column * _PITCH, 1.0, "abc"[column], title)
         axes = style.place(figure, left, _TOP, _MAP_WIDTH, _HEIGHT)
@@ -139,6 +144,7 @@ def _maps(data: xr.Dataset, along: Sequence[SweepAxis], shown: Sequence[SweepMea
         )
         figure.colorbar(drawn, cax=bar)
         bar.tick_params(length=1.5)
+        bar.set_title(measure.unit, loc="left", pad=4.0, fontsize=style.SMALL)
         failed = ~cases.good(data)
         axes.plot(
             first.places[failed], second.places[failed], "x", color=style.INTACT, markersize=3,
@@ -147,6 +153,7 @@ def _maps(data: xr.Dataset, along: Sequence[SweepAxis], shown: Sequence[SweepMea
         _name(axes, first, "x")
         if column == 0:
             _name(axes, second, "y")
+            axes.set_ylabel(second.label.replace(" (", "\n("))  # keys are long
             axes.tick_params("y", rotation=90.0 if second.words else 0.0)
         else:
             axes.tick_params("y", left=False, labelleft=False)

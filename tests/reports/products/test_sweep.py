@@ -10,7 +10,7 @@ from pipeline.problem.sections import split_value, sweep_cases
 from pipeline.runtime import SweepResult
 from pipeline.stages import sweep as stage
 from reports.__main__ import main
-from reports.products.sweep import cases
+from reports.products.sweep import cases, figure
 from tests.pipeline import static
 from tests.reports.conftest import Failing
 
@@ -98,6 +98,20 @@ def test_words_take_places_beside_each_other(tmp_path: Path) -> None:
     assert list(amplitude.distinct) == [1.0, 2.0, 3.0]
     assert law.words == ("angle", "distance")
     assert list(law.places) == [0, 0, 0, 1, 1, 1]
+
+
+def test_bars_and_axes_tell_their_units(tmp_path: Path) -> None:
+    at, path = paths(tmp_path, MAP)
+    data, asked = datasets.read(path, "sweep"), problem.load(at)
+    assert asked.sweep is not None
+    for unit, shown in (("N mm", "N mm"), ("1", "")):
+        data["loss"].attrs["units"] = unit
+        maps = figure.draw_sweep(data, asked.sweep).axes
+        assert [bar.get_title(loc="left") for bar in maps[1::2]] == [shown, "", "°"]
+        assert maps[0].get_xlabel() == "drive.amplitude (mm)"
+        loss, _, angle = figure.measures(data)
+        assert loss.label == ("Loss $J$ (N mm)" if shown else "Loss $J$")
+        assert angle.label == "Void angle (°)"
 
 
 def test_a_sweep_of_another_problem_is_refused(tmp_path: Path, failing: Failing) -> None:
