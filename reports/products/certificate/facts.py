@@ -9,7 +9,7 @@ from reports.facts import Fact, facts_of, grouped, measures
 from reports.products.certificate.figure import CertifiedDesign, load_text
 
 NEAR = 0.95
-"""Of the greatest loss that a search ended at: those above it found the same worst."""
+"""Of the greatest loss that was found: searches that end above it found the same worst."""
 _told = facts_of(__file__)
 
 
@@ -41,7 +41,7 @@ def _worst(found: CertifiedDesign) -> Iterator[Fact]:
     ends = found.own["found_loss"]
     yield _told("searches", ends.size)
     yield _told("worst_found", found.most, load=load_text(found))
-    yield _told("near", int((ends > NEAR * ends.max()).sum()))
+    yield _told("near", int((ends > NEAR * found.most).sum()))
     reduction = measures.reduction(found.worst.response["loss"].isel(case=0))
     yield _told("reduction", reduction)
 
