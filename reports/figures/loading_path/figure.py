@@ -50,9 +50,7 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
     problem, path = study.problem, abscissa_of(study.problem, study.response)
     grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS)
     top = 52.0
-    two_lines = bool(study.recordings) or study.response.sizes["case"] > 1
-    head = 11.5 if two_lines else 8.5
-    low = top + head + grid.lines * grid.side + 2.0
+    low = top + grid.head + grid.lines * grid.side + 2.0
     colours = shade_of(problem, study.response).field.label.replace("u_y", "u<sub>y</sub>")
     symbol = "Loss (N mm)" if problem.objective.kind == "strain_energy" else r"Loss $J$"
     clamped = _PROSE["rest"].format(
@@ -63,7 +61,7 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
         *design_panels(study, symbol, clamped),
         Panel(
             ("c", "Response, true to scale", 0.0, top),
-            lambda figure: snapshots(figure, study, grid, top + head),
+            lambda figure: snapshots(figure, study, grid, top + grid.head),
             f"Snapshots at true size, coloured by {colours}.",
         ),
         *_side_by_side(list(_curves(study, path)), low),

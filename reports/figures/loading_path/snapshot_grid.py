@@ -1,11 +1,13 @@
 """Describes structures along the path, true to scale, side by side and above one another."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator
 
 from pipeline.problem import Problem
@@ -25,6 +27,12 @@ LABEL, BAR, GAP = 6.0, 14.0, 1.2
 """Room for labels left of snapshots and for the bar of colours, and between snapshots; mm."""
 LARGEST = 44.0
 """Side of a snapshot where there is room, mm."""
+
+_HEAD, _LINE = 8.5, 3.0
+"""Room above snapshots whose labels are of one line, and for each other one, mm."""
+
+_GAPS = re.compile(r" (?![^(]*\))")
+"""Spaces outside of brackets."""
 
 Label = tuple[str, str]
 
@@ -51,8 +59,9 @@ def rows(study: StudyResults) -> list[SnapshotStructure]:
         label, colour = display_name(problem, name), style.STRUCTURE_COLOURS[name]
         filmed = [each for each in study.recordings if each.structure == name]
         for each in filmed:
-            part = each.motion(response, along)
-            found.append(SnapshotStructure(f"{label}\n{each.source}", colour, part))
+            part, told = each.motion(response, along), f"{label}\n{each.source}"
+            told = told if len(loads) == 1 else f"{told}\n{loads[each.case]}"
+            found.append(SnapshotStructure(told, colour, part))
         label = f"{label}\nsimulation" if filmed else label
         for case, load in enumerate(loads):
             told = label if len(loads) == 1 else f"{label}\n{load}"
@@ -101,9 +110,45 @@ class SnapshotLayout:
         """Tells where the snapshots begin so that all of them are in the middle."""
         return LABEL + (style.TWO_COLUMNS - LABEL - BAR - self.columns * self.side) / 2
 
+    @property
+    def labels(self) -> tuple[list[Label], list[Label]]:
+        """Lists the labels above and left of the snapshots, each no longer than one of these."""
+        path, room = self.path, self.side - GAP
+        kinds = [(_wrapped(row.label, room), row.colour) for row in self.rows]
+        loads = (f"{path.symbol} = {path.at(sample)}" for sample in path.shown)
+        values = [(_wrapped(load, room), style.INTACT) for load in loads]
+        return (kinds, values) if self.beside else (values, kinds)
+
+    @property
+    def head(self) -> float:
+        """Returns the room for the panel's title and the labels above the snapshots."""
+        return _HEAD + _LINE * max(text.count("\n") for text, _ in self.labels[0])
+
     def at(self, row: int, load: int) -> tuple[int, int]:
         """Returns line and column of a snapshot."""
         return (load, row) if self.beside else (row, load)
+
+
+def _wrapped(text: str, room: float) -> str:
+    """Breaks lines of a label between words, not in brackets, to be no longer than so many mm."""
+    if "\n" not in text and _length(text, style.TEXT) <= room:
+        return text
+    lines: list[str] = []
+    for line in text.split("\n"):
+        lines.append("")
+        for word in _GAPS.split(line):
+            longer = f"{lines[-1]} {word}".strip()
+            if lines[-1] and _length(longer, style.SMALL) > room:
+                lines.append(word)
+            else:
+                lines[-1] = longer
+    return "\n".join(lines)
+
+
+def _length(text: str, size: float) -> float:
+    """Measures a line of text in points, mm."""
+    points = TextPath((0.0, 0.0), text, size=size).get_extents().width
+    return float(points) * style.MM_PER_INCH / 72.0
 
 
 Overlay = Callable[[Axes, SnapshotStructure, int], None]
@@ -127,10 +172,7 @@ def snapshots(
             snapshot(axes, study.problem, row.part, sample, shade, row.case)
             if overlay is not None:
                 overlay(axes, row, sample)
-    loads = [f"{grid.path.symbol} = {grid.path.at(sample)}" for sample in grid.path.shown]
-    kinds = [(row.label, row.colour) for row in grid.rows]
-    values = [(load, style.INTACT) for load in loads]
-    _labels(figure, grid, top, *((kinds, values) if grid.beside else (values, kinds)))
+    _labels(figure, grid, top, *grid.labels)
     end = grid.left + grid.columns * side
     shade_bar(figure, shade, (end + 1.5, top, grid.lines * side - GAP))
 
@@ -146,8 +188,8 @@ def _labels(
         )  # fmt: skip
     for k, (text, colour) in enumerate(left):
         y = top + (k + 0.5) * grid.side - GAP / 2
-        size = style.SMALL if "\n" in text else style.TEXT
-        style.write_upwards(figure, grid.left - 1.5, y, text, color=colour, fontsize=size)
+        size, off = (style.SMALL, 0.5) if "\n" in text else (style.TEXT, 1.5)
+        style.write_upwards(figure, grid.left - off, y, text, color=colour, fontsize=size)
 
 
 def snapshot(

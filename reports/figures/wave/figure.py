@@ -41,7 +41,7 @@ def wave_figure(study: StudyResults) -> PanelFigure:
     path, half = abscissa_of(study.problem, study.response), style.TWO_COLUMNS / 2
     grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS)
     top = 52.0
-    middle = top + ROOM + grid.lines * grid.side + 1.5
+    middle = top + grid.head + grid.lines * grid.side + 1.5
     low = middle + 44.0
 
     def error(figure: Figure) -> None:
@@ -52,7 +52,9 @@ def wave_figure(study: StudyResults) -> PanelFigure:
         *design_panels(study, r"Loss $J$", _PROSE["a"], partial(_mark_places, study)),
         Panel(
             ("c", "Response, true to scale; red dots: closed voids", 0.0, top),
-            lambda figure: snapshots(figure, study, grid, top + ROOM, partial(_contacts, study)),
+            lambda figure: snapshots(
+                figure, study, grid, top + grid.head, partial(_contacts, study)
+            ),
             _PROSE["c"],
         ),
         Panel(

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from pipeline import problem
 from pipeline.problem import Output
 from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.sections.drives import RotationDrive
+from reports.base import style
 from reports.facts import Fact
 from reports.facts.measures import first_within
 from reports.figures.loading_path import (
@@ -78,6 +80,21 @@ def test_each_load_case_has_rows_snapshots_and_a_curve(two: StudyResults) -> Non
     assert (one.get_color(), one.get_linestyle()) != (other.get_color(), other.get_linestyle())
     once, thrice = (np.asarray(line.get_ydata(), dtype=float) for line in (one, other))
     np.testing.assert_allclose(thrice, 3 * once)
+
+
+def test_snapshots_of_many_recordings_are_told_apart(two: StudyResults, tmp_path: Path) -> None:
+    """Each by its structure and load, in labels that do not run into the next one's."""
+    shown = (("altered", 0), ("cloaked", 0), ("cloaked", 1))
+    filmed = recorded_study.with_recordings(two, tmp_path, *shown)
+    path = abscissa.abscissa_of(filmed.problem, filmed.response)
+    grid = snapshot_grid.SnapshotLayout.of(filmed, path, 100.0)
+    assert len({row.label for row in grid.rows}) == len(grid.rows)
+    made = style.page(200.0)
+    snapshot_grid.snapshots(made, filmed, grid, grid.head)
+    made.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in made.texts if text.get_text()]
+    assert all(box.x0 >= 0.0 and box.y1 <= made.bbox.y1 for box in boxes)
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
 
 
 @cases("reports", "degrees, labels")
