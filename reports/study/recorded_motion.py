@@ -1,7 +1,7 @@
 """Holds recordings of a study beside its simulation, along the same course: time, or the load."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -28,6 +28,7 @@ class RecordedMotion:
     # falling
     along: Floats
     frames: NDArray[np.int64]  # (n_frames,) the frames that these are, of those in the dataset
+    take: int = 0  # number among those of its structure and load case, zero of the only one
 
     @property
     def structure(self) -> str:
@@ -47,7 +48,8 @@ class RecordedMotion:
     @property
     def source(self) -> str:
         """Tells what a figure calls it."""
-        return f"experiment ({LABEL})" if self.synthetic else "experiment"
+        words = f"experiment ({LABEL})" if self.synthetic else "experiment"
+        return f"{words}, take {self.take}" if self.take else words
 
     def values(self, variable: xr.DataArray) -> Floats:
         """Returns a variable (time, ...) of the dataset at its frames (n_frames, ...)."""
@@ -85,7 +87,18 @@ def recordings(
     """Returns the recordings of a study, in the order of its structures and load cases."""
     found = [_recorded(problem, response, name, data) for name, data in sorted(compared.items())]
     order = [str(name) for name in response["structure"].values]
-    return sorted(found, key=lambda each: (order.index(each.structure), each.case))
+    ordered = sorted(found, key=lambda each: (order.index(each.structure), each.case))
+    kinds = [(each.structure, each.case) for each in ordered]
+    return [
+        replace(each, take=kinds[: k + 1].count(kind)) if kinds.count(kind) > 1 else each
+        for k, (each, kind) in enumerate(zip(ordered, kinds, strict=True))
+    ]
+
+
+def takes(recorded: Sequence[RecordedMotion]) -> Iterator[tuple[int, list[RecordedMotion]]]:
+    """Yields the recordings of each take, with its number; an only one is of all of them."""
+    for number in sorted({each.take for each in recorded if each.take}) or [0]:
+        yield number, [each for each in recorded if each.take in {0, number}]
 
 
 def _recorded(

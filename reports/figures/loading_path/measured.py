@@ -13,7 +13,7 @@ from reports.figures.loading_path import measures
 from reports.figures.loading_path.abscissa import Abscissa, load_names
 from reports.figures.loading_path.measures import Measure
 from reports.panels import measured_overlay
-from reports.study import RecordedMotion, StudyResults, display_name
+from reports.study import RecordedMotion, StudyResults, display_name, takes
 from sim.core import Floats
 
 Of = Callable[[xr.Dataset], xr.DataArray]
@@ -99,26 +99,36 @@ def measured_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     names = load_names(study.problem, study.response)
     for case in cases:
         recorded = [each for each in study.recordings if each.case == case]
-        under = ("", "") if len(cases) == 1 else (f"_case{case}", f", {names[case]}")
+        under: Under = ("", "") if len(cases) == 1 else (f"_case{case}", f", {names[case]}")
         yield from _measure_facts(study, recorded, path, measure, under)
         if path.static:
             yield from _contraction_facts(study, recorded, path, under)
 
 
+def _taken(under: Under, take: int) -> Under:
+    """Adds the take, if there are several; the first has the key of an only one."""
+    key, label = under
+    return f"{key}_take{take}" if take > 1 else key, f"{label}, take {take}" if take else label
+
+
 def _contraction_facts(
     study: StudyResults, recorded: Sequence[RecordedMotion], path: Abscissa, under: Under
 ) -> Iterator[Fact]:
+    def contraction(made: xr.Dataset) -> xr.DataArray:
+        return measures.contraction(study.problem, made)
+
     ends: dict[str, float] = {}
     for each in recorded:
-        values = curve(study, path, each, lambda made: measures.contraction(study.problem, made))
-        ends[each.structure] = values[-1]
+        values, taken = curve(study, path, each, contraction), _taken(under, each.take)
+        ends[each.name] = values[-1]
         note = f"{each.source}; {_interval(each, path, 'contraction')}"
-        yield _of(study, "contraction_{structure}", each.structure, values[-1], under, note=note)
-    for name in ("altered", "cloaked"):
-        if name in ends and "intact" in ends:
-            off = ends[name] / ends["intact"] - 1.0
-            note = _change(recorded, path, "contraction", ("intact", name), sign=-1)
-            yield _of(study, "contraction_error_{structure}", name, off, under, note=note)
+        yield _of(study, "contraction_{structure}", each.structure, values[-1], taken, note=note)
+    for take, some in takes(recorded):
+        of = {each.structure: ends[each.name] for each in some}
+        for name in [name for name in ("altered", "cloaked") if {name, "intact"} <= of.keys()]:
+            off, taken = of[name] / of["intact"] - 1.0, _taken(under, take)
+            note = _change(some, path, "contraction", ("intact", name), sign=-1)
+            yield _of(study, "contraction_error_{structure}", name, off, taken, note=note)
 
 
 def _of(
@@ -144,18 +154,21 @@ def _measure_facts(
     for each in recorded:
         if each.structure == "intact":
             continue
-        values = curve(study, path, each, measure.of)
+        values, taken = curve(study, path, each, measure.of), _taken(under, each.take)
         course = xr.DataArray(values, dims="time")
-        ends[each.structure] = end = float(measures.overall(study.problem, course))
+        ends[each.name] = end = float(measures.overall(study.problem, course))
         note = f"{each.source}; {_interval(each, path, measure.key)}".removesuffix("; ")
-        yield _of(study, "{key}_{structure}", each.structure, end, under, note=note, **of)
+        yield _of(study, "{key}_{structure}", each.structure, end, taken, note=note, **of)
         most = float(np.nanmax(values))
-        yield _of(study, "{key}_{structure}_most", each.structure, most, under, **of)
-    if {"altered", "cloaked"} <= ends.keys():
-        gain = 1.0 - ends["cloaked"] / ends["altered"]
-        note = _change(recorded, path, measure.key, ("altered", "cloaked"))
+        yield _of(study, "{key}_{structure}_most", each.structure, most, taken, **of)
+    for take, some in takes(recorded):
+        named = {each.structure: each.name for each in some}
+        if not {"altered", "cloaked"} <= named.keys():
+            continue
+        gain = 1.0 - ends[named["cloaked"]] / ends[named["altered"]]
+        note = _change(some, path, measure.key, ("altered", "cloaked"))
         words = {"measured": MEASURED, "key": measure.key, "what": measure.label}
-        words |= dict(zip(_CASE, under, strict=True))
+        words |= dict(zip(_CASE, _taken(under, take), strict=True))
         yield _told("{measured}{key}_reduction{case}", gain, note=note, **words)
 
 

@@ -35,6 +35,7 @@ from reports.study import (
     evaluation_count,
     from_dataset,
     middle_of_top_edge,
+    takes,
 )
 from sim.core import Floats
 
@@ -180,18 +181,28 @@ def recorded_facts(study: StudyResults) -> Iterator[Fact]:
     """Yields peak-to-peak u_y of the same unit as it was measured."""
     unit = middle_of_top_edge(from_dataset(study.response.isel(structure=0), study.scene.spacing))
     spans: dict[str, list[Floats]] = {}
-    for each in monitored_recordings(study):
+    recorded = monitored_recordings(study)
+    for each in recorded:
         found = each.data["peak_to_peak"].isel(unit=unit).sel(dof="uy")
-        sides = spans[each.structure] = [
+        sides = spans[each.name] = [
             found.sel(source=source).values for source in ("measured", "simulated")
         ]
         words = recording_facts.intervals(sides[0][1:], sides[1][1:], " mm")
-        of = {"start": MEASURED, "structure": each.structure, "source": each.source}
-        yield _told("{start}peak_to_peak_{structure}", float(sides[0][0]), words=words, **of)
-    if {"altered", "cloaked"} <= spans.keys():
-        gain, predicted = map(compute_reduction, spans["altered"], spans["cloaked"])
-        note = recording_facts.intervals(100 * gain[1:], 100 * predicted[1:], " %")
-        yield _told("{start}peak_to_peak_reduction", float(gain[0]), start=MEASURED, note=note)
+        of = {"structure": each.structure, "source": each.source} | _take(each.take)
+        yield _told("{start}peak_to_peak_{structure}{take}", float(sides[0][0]), words=words, **of)
+    for take, some in takes(recorded):
+        named = {each.structure: spans[each.name] for each in some}
+        if {"altered", "cloaked"} <= named.keys():
+            gain, predicted = map(compute_reduction, named["altered"], named["cloaked"])
+            note = recording_facts.intervals(100 * gain[1:], 100 * predicted[1:], " %")
+            of = {"note": note} | _take(take)
+            yield _told("{start}peak_to_peak_reduction{take}", float(gain[0]), **of)
+
+
+def _take(number: int) -> dict[str, str]:
+    """Ends the key and the label of a fact of one take of several."""
+    told = f", take {number}" if number else ""
+    return {"start": MEASURED, "take": f"_take{number}" if number > 1 else "", "told": told}
 
 
 def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:

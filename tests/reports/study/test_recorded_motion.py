@@ -64,6 +64,33 @@ def facts(study: StudyResults) -> dict[str, Fact]:
     return {fact.key: fact for fact in kinds.kind_of(study.problem).facts(study)}
 
 
+@pytest.mark.parametrize(
+    ("name", "key", "case"), [("study", "peak_to_peak", 1), ("shield", "rotation", 0)]
+)
+def test_takes_of_one_test_are_told_apart(
+    filmed: dict[str, StudyResults], name: str, key: str, case: int
+) -> None:
+    """The second one moves half as much; the only one without a cloak stands beside both."""
+    study, doubled = filmed[name], f"cloaked_{case}"
+    half = study.compared[doubled].copy(deep=True)
+    for variable in ("measured", "peak_to_peak"):
+        half[variable] = 0.5 * half[variable]
+    twice = replace(study, compared={**study.compared, f"{doubled}_again": half})
+    assert [each.take for each in twice.recordings] == [0, 1, 2]
+    told = kinds.kind_of(twice.problem).facts(twice)
+    keys = [fact.key for fact in told if fact.key.startswith("measured_")]
+    assert len(set(keys)) == len(keys)
+    before, known = facts(study), {fact.key: fact for fact in told}
+    for ending, factor in (("", 1.0), ("_take2", 0.5)):
+        fact = known[f"measured_{key}_cloaked{ending}"]
+        assert fact.value == pytest.approx(factor * before[f"measured_{key}_cloaked"].value)
+        assert ", take" in fact.label
+        gain = known[f"measured_{key}_reduction{ending}"].value
+        left = 100.0 - before[f"measured_{key}_reduction"].value
+        assert gain == pytest.approx(100.0 - factor * left)
+    assert ", take" not in known[f"measured_{key}_altered"].label
+
+
 def test_measured_motions_are_told(filmed: dict[str, StudyResults]) -> None:
     shaken, shield, smile = (facts(filmed[name]) for name in ("study", "shield", "smile"))
     for name in ("altered", "cloaked"):
