@@ -23,12 +23,15 @@ from tests.pipeline import unchanged
 from tests.pipeline.fabrication import handmade
 
 
-def built(folder: Path, name: str) -> tuple[Problem, BuiltSpecimen]:
+def built(folder: Path, name: str, *changes: tuple[str, str]) -> tuple[Problem, BuiltSpecimen]:
     """The draft of a study, undesigned."""
-    asked = problem.load(ROOT / f"experiments/{name}/problem.yaml", "quick")
     path = folder / "problem.yaml"
     text = (ROOT / f"experiments/{name}/problem.yaml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
     path.write_text(text, encoding="utf-8")
+    asked = problem.load(path, "quick")
     design = unchanged.write(path, "quick")
     net = network(datasets.read(design, "design"), "altered")
     return asked, build_specimen(net, asked.fabrication, (name, "altered"), design)
@@ -57,6 +60,41 @@ def test_both_triangles_of_a_cell_are_held_by_one_bar(tmp_path: Path) -> None:
     assert shapely.intersection_all(list(bases.values())).is_empty
 
 
+SLANTED = (("cell_angle: 90 deg", "cell_angle: 60 deg"), ("[45 mm, 45 mm]", "[66 mm, 38 mm]"))
+ACROSS = (("units: left", "units: bottom"), ("units: right", "units: top"))
+
+
+@pytest.mark.parametrize(("changes", "angle"), [(SLANTED, 60.0), (SLANTED + ACROSS, 0.0)])
+def test_bars_run_along_the_sides_of_a_slanted_lattice(
+    tmp_path: Path, changes: tuple[tuple[str, str], ...], angle: float
+) -> None:
+    asked, specimen = built(tmp_path, "kagome", *changes)
+    bases, capped = plan_bases(specimen, asked.fabrication, asked.lattice.spacing)
+    assert not capped
+    held = [{unit.label for unit in base.held} for base in bases]
+    assert held == [{*specimen.clamped}, {*specimen.driven}]
+    one, other = (base.area for base in bases)
+    assert one.distance(other) > asked.lattice.spacing
+    for base in bases:
+        corners = np.asarray(shapely.minimum_rotated_rectangle(base.area).exterior.coords)
+        sides = np.diff(corners[:3], axis=0)
+        x, y = sides[np.argmax(np.linalg.norm(sides, axis=1))]
+        assert np.degrees(np.arctan2(y, x)) % 180.0 == pytest.approx(angle, abs=1e-6)
+        for unit in base.held:
+            assert base.area.intersection(unit.outline).area > 0.3 * unit.outline.area
+
+
+def test_a_base_has_its_bolt_and_no_narrow_neck(tmp_path: Path) -> None:
+    """Even a pad that winds between units that move."""
+    asked, specimen = built(tmp_path, "kagome", *SLANTED)
+    every = [unit.label for unit in specimen.units]
+    for label in every[:20:2]:
+        alone = replace(specimen, clamped=(label,), driven=())
+        for base in plan_bases(alone, asked.fabrication, asked.lattice.spacing)[0]:
+            assert len(base.area.interiors) == 1
+            assert isinstance(Polygon(base.area.exterior).buffer(-0.9), Polygon)
+
+
 def test_units_of_a_list_are_grouped_by_where_they_are() -> None:
     """Those of a file of polygons are all in one row."""
     made = handmade.specimen()
@@ -65,7 +103,7 @@ def test_units_of_a_list_are_grouped_by_where_they_are() -> None:
     left = [unit for unit in units if unit.design.centroid.x < handmade.SPACING / 2]
     edges, others = held_edges(units, listed, handmade.SPACING)
     assert len(edges) * 3 + len(others) == len(units)
-    assert all(edge.along == 0 for edge in edges)
+    assert all(edge.along == (1.0, 0.0) for edge in edges)
     assert held_edges(left, listed, handmade.SPACING) == ([], left)
     assert np.ptp([unit.design.centroid.y for unit in edges[0].units]) < 1.0
     corners = [units[n] for n in (0, 2, 3, 5)]
@@ -181,5 +219,5 @@ def test_columns_of_squares_are_held_as_they_were(name: str, tmp_path: Path) -> 
     held = [specimen.by_label[label] for label in specimen.clamped]
     (edge,), others = held_edges(held, specimen, 15.0)
     assert not others
-    assert edge.along == 1
+    assert edge.along == (0.0, 1.0)
     assert {unit.column for unit in edge.units} == {0}
