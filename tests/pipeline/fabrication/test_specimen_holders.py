@@ -185,9 +185,25 @@ def test_no_wall_stands_where_thick_shims_go(
     made = [part for part in fixtures(specimen, asked, handmade.SPACING) if "LID" not in part.id]
     assert [part.id for part in made] == ["CLAMP-A1", "CLAMP-C2", "JIG1"]
     for part in made:
-        walls = part.layers[2].area
+        walls = part.layers[-1].area
         assert walls.area > 10.0
         assert walls.intersection(shims).area < 1e-6
+
+
+def test_every_plate_of_a_jig_has_its_name_below() -> None:
+    """Its rim is a wall, which letters in its floor do not reach."""
+    given = {"print": {"bed": ["45 mm", "60 mm"]}}
+    asked = Fabrication.model_validate(given, context=SIM_UNITS)
+    made = fixtures(handmade.specimen(), asked, handmade.SPACING)
+    plates = [part for part in made if part.id.startswith("JIG")]
+    assert len(plates) > 1
+    below = []
+    for part in plates:
+        box = shapely.box(*part.bounds)
+        below.append(box.difference(part.layers[0].area).area)
+        assert part.layers[1].area.equals(box)
+    assert min(below) > 2.0
+    assert len({round(area, 3) for area in below}) == len(below)
 
 
 @pytest.mark.parametrize(("depth", "base"), [(3.0, 0.4), (2.5, 0.3), (0.4, 0.4), (0.4, 4.0)])
