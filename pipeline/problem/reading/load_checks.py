@@ -106,6 +106,16 @@ def horizon(problem: Problem) -> Findings:
         yield ProblemFault(what, ("horizon", "steps"), "drive by a linear_ramp, or give `samples`")
 
 
+def drive_comes(problem: Problem) -> Findings:
+    """Finds drives that come after the horizon: nothing moves until its end."""
+    end = problem.horizon_time
+    for keys, drive in _drives(problem):
+        grows = getattr(drive, "width", None) or getattr(drive, "rise_time", None) or 0.0
+        if (begin := getattr(drive, "delay", 0.0) - grows) > end:
+            what = f"the drive comes at {begin:g} s, after the horizon, which ends at {end:g} s"
+            yield ProblemFault(what, (*keys, "delay"), "lower it, or lengthen the horizon")
+
+
 def reaction(problem: Problem) -> Findings:
     """Finds why the force of the drive cannot be mimicked."""
     objective, place = problem.objective, ("objective", "reaction")

@@ -46,6 +46,12 @@ def test_presets_are_mappings(refusal: Refusal) -> None:
     assert refusal("  edge3:\n    title", "  edge3: 3\n  x:\n    title", "edge3").line is not None
 
 
+def test_a_drive_comes_before_the_horizon_ends(refusal: Refusal) -> None:
+    error = refusal("delay: 100 ms", "delay: 900 ms", "pulse")
+    assert error.what == "the drive comes at 0.87 s, after the horizon, which ends at 0.4 s"
+    assert error.key == "presets.pulse.drive.delay"
+
+
 @cases("problem", "text, what, line")
 def test_text_that_is_no_problem(tmp_path: Path, text: str, what: str, line: int | None) -> None:
     path = tmp_path / "problem.yaml"
