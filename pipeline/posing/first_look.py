@@ -1,5 +1,6 @@
 """Looks at a problem before it is computed: what it costs, and what may not be meant."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,7 +12,14 @@ from scipy.spatial.distance import pdist, squareform
 from pipeline.posing.perturbed import noises
 from pipeline.posing.to_scene import material_of
 from pipeline.problem import Problem
-from pipeline.problem.sections import SingleDrive, Triangular, case_count, single_drives
+from pipeline.problem.sections import (
+    LinearRampDrive,
+    SingleDrive,
+    TanhRampDrive,
+    Triangular,
+    case_count,
+    single_drives,
+)
 from sim.core import Floats, Ints
 from sim.scene import Scene, estimate_cost, sample_times
 from sim.structure import Lattice, Material, polygons
@@ -116,6 +124,8 @@ def doubts(asked: Problem, scene: Scene) -> Iterator[str]:
                 f"rows of hexagons buckle when they are pushed by {BUCKLING * size:.2g} mm or so,"
                 " which no cloak hides: pull them (`drive.directions: [0 deg]`), or push them less"
             )
+    yield from _ends(asked)
+    yield from _shown(asked)
     yield from _picture(asked)
     yield from _necks(scene.lattice)
     if scene.lattice.n_units <= MANY:
@@ -189,6 +199,47 @@ def _inward(drive: SingleDrive, scene: Scene) -> bool:
     outward = sites[driven].mean(axis=0) - sites.mean(axis=0)
     ways = np.array(getattr(drive, "directions", ()))
     return bool((np.cos(ways) * outward[0] + np.sin(ways) * outward[1] < -1e-6).any())
+
+
+def _reach(drive: SingleDrive, horizon: float) -> float:
+    """Computes the largest size of a drive until the horizon, in its unit."""
+    size: float = getattr(drive, "amplitude", math.inf)
+    if isinstance(drive, LinearRampDrive):
+        return size * horizon / drive.duration
+    if isinstance(drive, TanhRampDrive):
+        return size * (1 + math.tanh(6 * (2 * horizon / drive.duration - 1))) / 2
+    return size
+
+
+def _ends(asked: Problem) -> Iterator[str]:
+    """Doubts ramps that end before or after the horizon does."""
+    horizon = asked.horizon_time
+    for drive in single_drives(asked.drive):
+        if not isinstance(drive, LinearRampDrive | TanhRampDrive):
+            continue
+        if not math.isclose(reach := _reach(drive, horizon), drive.amplitude, rel_tol=1e-3):
+            yield (
+                f"the drive goes {reach:.3g} mm for its amplitude of {drive.amplitude:g} mm: its"
+                f" duration is {drive.duration:g} s, and the horizon ends at {horizon:g} s; give"
+                " `drive.duration` and `horizon.duration` alike if that is not meant"
+            )
+
+
+def _shown(asked: Problem) -> Iterator[str]:
+    """Doubts what a report is to show and the response does not reach."""
+    first, horizon = single_drives(asked.drive)[0], asked.horizon_time
+    cycles = asked.response.cycles / asked.frequency if asked.frequency else 0.0
+    name, end, unit = "instants", max(horizon, cycles), "s"
+    if asked.static:
+        name, end, unit = "snapshots", _reach(first, horizon), first.unit
+    listed: tuple[float, ...] = getattr(asked.report, name)
+    if beyond := [each for each in listed if each > end * (1 + 1e-6)]:
+        yield (
+            f"the response ends at {end:.4g} {unit}, which is shown for {beyond[0]:g} as well;"
+            f" mend `report.{name}`"
+        )
+    if asked.static and listed and unit != "mm":
+        yield f"`report.snapshots` are lengths, and are taken as {unit}: the drive is no length"
 
 
 def _picture(asked: Problem) -> Iterator[str]:
