@@ -21,7 +21,7 @@ def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = N
     """
     data = problem.model_dump(mode="json", by_alias=True, exclude_none=True)
     _keep_switches(data)
-    for name in () if stage == REPORT else STAGES[stage].unused or ():
+    for name in () if stage == REPORT else _unused(problem, stage):
         data.pop(name, None)
     limits = data.get("constraints")
     if isinstance(limits, dict) and not limits["straight_shims"]:
@@ -36,6 +36,16 @@ def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = N
         methods = data["optimiser"]["methods"]
         data["optimiser"]["methods"] = {method: methods[method]}
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _unused(problem: Problem, stage: str) -> tuple[str, ...]:
+    """Lists the sections that a stage does not depend on.
+
+    A design that is kept from snapping is confirmed at the loads that its response shows.
+    """
+    confirmed = stage in ("design", "redesign") and problem.objective.snap == "avoid"
+    listed = STAGES[stage].unused or ()
+    return tuple(name for name in listed if not (confirmed and name == "response"))
 
 
 def _keep_switches(data: dict[str, Any]) -> None:

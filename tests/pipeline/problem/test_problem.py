@@ -27,6 +27,7 @@ from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.reading import load, overlay_keys, preset_names
 from pipeline.problem.sections import Fabrication, Quads
 from pipeline.runtime import ROOT, STAGES
+from tests.pipeline import static
 from tests.pipeline.conftest import Refusal
 from tests.tables import cases, refused
 
@@ -233,6 +234,20 @@ def read_to_pose() -> set[str]:
             limits_of(problem)
             patch.undo()
     return read
+
+
+@pytest.mark.parametrize(("snap", "alike"), [("allow", True), ("avoid", False)])
+def test_a_design_kept_from_snapping_depends_on_the_loads_that_are_shown(
+    snap: str, alike: bool, tmp_path: Path
+) -> None:
+    """At these it is confirmed."""
+    path = static.write(tmp_path, static.HOLE, size=5)
+    text = path.read_text().replace("target: intact", f"target: intact, snap: {snap}")
+    hashes = []
+    for samples in (9, 21):
+        path.write_text(text.replace("samples: 9", f"samples: {samples}"))
+        hashes.append([section_hash(load(path), name) for name in ("design", "redesign")])
+    assert (hashes[0] == hashes[1]) is alike
 
 
 def others(section: BaseModel, path: str = "") -> Iterator[tuple[str, BaseModel]]:
