@@ -9,7 +9,8 @@ import xarray as xr
 from pydantic import ValidationError
 
 from pipeline.posing.case_result import PosedStructure, structures_of
-from pipeline.posing.to_scene import lattice_of, scene_of
+from pipeline.posing.structure_variables import of_problem
+from pipeline.posing.to_scene import scene_of
 from pipeline.problem import Problem, canonical_json, from_canonical
 from pipeline.problem.reading import find_faults, first_fault
 from pipeline.problem.sections import Setting, SettingError, apply_setting
@@ -38,8 +39,8 @@ def results(
     """
     try:
         problem = posed(asked, setting)
-        if lattice_of(problem).n_units != design.sizes["unit"]:
-            raise UnposedError("the design is of a lattice with another number of units")
+        if not of_problem(problem, design):
+            raise UnposedError("the design is of another lattice, or lacks units of this one")
         # No design space is asked for: its symmetry costs more than it could save.
         scene = scene_of(problem, folder).updated(symmetry="none")
     except ValidationError as error:

@@ -1,6 +1,7 @@
 """Reads a YAML file and one of its presets to a checked problem, or one clear message."""
 
 import hashlib
+import json
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from pipeline.problem import SWITCHES, Problem
+from pipeline.problem import SWITCHES, Problem, canonical_json
 from pipeline.problem.fields import FOLDER, Section
 from pipeline.problem.reading import yaml_file
 from pipeline.problem.reading.feasibility import find_faults
@@ -52,7 +53,7 @@ def load(path: str | Path, preset: str | None = None) -> Problem:
     except ValidationError as error:
         raise explain_error(error, document, data, preset) from error
     if problem.sweep is not None:
-        _check_sweep(problem.sweep, document, data, preset)
+        _check_sweep(problem, problem.sweep, document, data, preset)
     if preset is None and problem.optimiser.start != "initial":
         what, remedy = "a study cannot start from its own design", "say so in a preset of it"
         raise _user_error(document, preset, data, ("optimiser", "start"), what, remedy)
@@ -76,9 +77,17 @@ def _design(document: Document, data: Mapping[str, Any], number: int) -> dict[st
 
 
 def _check_sweep(
-    sweep: Sweep, document: Document, data: Mapping[str, Any], preset: str | None
+    problem: Problem,
+    sweep: Sweep,
+    document: Document,
+    data: Mapping[str, Any],
+    preset: str | None,
 ) -> None:
-    """Tries the first value of every parameter that a sweep sets, one at a time."""
+    """Tries the first value of every parameter that a sweep sets, one at a time.
+
+    It has a place in the file, and among the values that the file leaves out.
+    """
+    canonical = json.loads(canonical_json(problem, "sweep"))
     first = next(sweep_cases.list_settings(sweep))
     for key, word in first.items():
         place = ("sweep", sweep.form, key)
@@ -86,6 +95,7 @@ def _check_sweep(
             Problem.model_validate(
                 sweep_cases.apply_setting(data, {key: word}), context={FOLDER: document.path.parent}
             )
+            sweep_cases.apply_setting(canonical, {key: word})
         except ValidationError as error:
             what, remedy = first_fault(error)
             raise _user_error(document, preset, data, place, what, remedy) from error

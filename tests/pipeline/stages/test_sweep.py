@@ -8,7 +8,7 @@ from pipeline import datasets, problem
 from pipeline.__main__ import run_stage
 from pipeline.datasets import chunked
 from pipeline.posing import scene_of, setting_losses
-from pipeline.problem.sections import Sweep, sweep_cases
+from pipeline.problem.sections import Setting, Sweep, sweep_cases
 from pipeline.runtime import CaseLog, SweepResult, UserError, case_log
 from sim.scene import Evaluator, make_plan
 from tests.pipeline import static, unchanged
@@ -135,11 +135,15 @@ def test_values_side_by_side() -> None:
 def test_a_setting_that_makes_no_problem_is_told(folder: Path) -> None:
     asked = problem.load(folder / "problem.yaml")
     design = datasets.read(folder / "design.nc", "design")
-    for setting, why in (
+    moved: Setting = {"void.disc.centre": ["45 mm", "30 mm"]}
+    listed: list[tuple[Setting, str]] = [
         ({"cloak.disc.radius": "500 mm"}, "cloak"),
-        ({"lattice.columns": 7}, "another number of units"),
+        ({"lattice.columns": 7}, "of another lattice"),
+        ({"lattice.bias_angle": "25 deg"}, "of another lattice"),
+        (moved, "lacks units"),
         ({"drive.amplitude": "-1 mm"}, "greater than zero"),
-    ):
+    ]
+    for setting, why in listed:
         with pytest.raises(setting_losses.UnposedError, match=why):
             setting_losses.results(asked, setting, folder, design, 1)
 
