@@ -5,7 +5,7 @@ import numpy as np
 from pipeline.posing.structure_variables import Variables
 from pipeline.posing.to_scene import contact_laws, lattice_of, material_of
 from pipeline.problem import Problem
-from pipeline.problem.sections import Kagome, ListedNetwork, Spectrum
+from pipeline.problem.sections import Kagome, Spectrum
 from pipeline.runtime import UserError
 from sim.core import SimulationError
 from sim.solvers import concrete
@@ -44,9 +44,6 @@ def compute_bands(asked: Problem, wanted: Spectrum) -> Variables:
 
 def _cell(asked: Problem) -> UnitCell:
     """Builds the unit cell of the lattice before anything was removed or reshaped."""
-    if isinstance(asked.lattice, ListedNetwork):
-        what = "a lattice from a file has no unit cell to send waves through"
-        raise UserError(what, key="spectrum", remedy="leave the section out")
     lattice = lattice_of(asked)
     made = parameters_at(lattice, lattice.vertices, material_of(asked, lattice))
     period = (4, 2) if isinstance(asked.lattice, Kagome) else (2, 2)

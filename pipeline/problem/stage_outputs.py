@@ -5,7 +5,7 @@ from typing import Literal
 
 from pipeline.problem.fields import csv_columns, units
 from pipeline.problem.model import Problem
-from pipeline.problem.sections import Sweep, write_quantity
+from pipeline.problem.sections import ListedNetwork, Sweep, write_quantity
 from pipeline.runtime import UserError
 
 Output = Literal[
@@ -71,6 +71,10 @@ def over_measured_constants(asked: Problem, folder: Path) -> Problem:
     """
     named = asked.report.measured_constants
     assert named is not None
+    if isinstance(asked.lattice, ListedNetwork) and asked.lattice.stiffnesses is not None:
+        what = "the lattice's file tells the stiffnesses of its ligaments"
+        key, remedy = "report.measured_constants", "leave the one or the other out"
+        raise UserError(what, file=folder / asked.lattice.file, key=key, remedy=remedy)
     path = folder / named.file
     drawn = csv_columns.read_quantities(path, _DIMENSIONS, named.samples)
     if not (drawn > 0).all():

@@ -9,6 +9,7 @@ from pipeline.problem.reading.yaml_file import KeyPath
 from pipeline.problem.sections import (
     DisplacementDrive,
     LinearRampDrive,
+    ListedNetwork,
     LoadRanges,
     Selector,
     SeveralDrives,
@@ -81,7 +82,10 @@ def one_kind_of_load(problem: Problem) -> Findings:
 
 
 def spectrum(problem: Problem) -> Findings:
-    """Finds drives to which there is no transmission of a displacement."""
+    """Finds drives to which there is no transmission of a displacement, lattices without a cell."""
+    if problem.spectrum is not None and isinstance(problem.lattice, ListedNetwork):
+        what = "a lattice from a file has no unit cell to send waves through"
+        yield ProblemFault(what, ("spectrum",), "leave the section out")
     if problem.spectrum is not None and not isinstance(problem.drive, DisplacementDrive):
         kind = "several drives" if isinstance(problem.drive, SeveralDrives) else problem.drive.kind
         what = f"a spectrum is that of one displacement along a line, not of {kind}"

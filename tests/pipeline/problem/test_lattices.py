@@ -217,6 +217,19 @@ def test_ligaments_of_a_list_may_have_stiffnesses_of_their_own(tmp_path: Path) -
     kept = np.isin(ends, scene.lattice.id).all(axis=1)
     assert 0 < kept.sum() < len(own)
     np.testing.assert_array_equal(scene.structure.material.bending_stiffness, own[kept])
+    named = {"measured_constants": {"file": "constants.csv"}}
+    report = problems.sections.ReportOptions.model_validate(named)
+    with refused("the lattice's file tells the stiffnesses", "report.measured_constants"):
+        problems.over_measured_constants(problem.model_copy(update={"report": report}), tmp_path)
+
+
+def test_a_list_has_no_unit_cell_for_a_spectrum(tmp_path: Path) -> None:
+    as_csv(tmp_path / "x.csv", SQUARES)
+    path = from_file(tmp_path, "x.csv")
+    band = "spectrum: { transmission: { from: 1 Hz, to: 9 Hz } }\n"
+    path.write_text(path.read_text() + band)
+    with refused("has no unit cell to send waves through", "spectrum"):
+        load(path)
 
 
 def test_hexagonal_is_another_name_of_the_honeycomb() -> None:
