@@ -219,9 +219,10 @@ def _ends(asked: Problem) -> Iterator[str]:
             continue
         if not math.isclose(reach := _reach(drive, horizon), drive.amplitude, rel_tol=1e-3):
             yield (
-                f"the drive goes {reach:.3g} mm for its amplitude of {drive.amplitude:g} mm: its"
-                f" duration is {drive.duration:g} s, and the horizon ends at {horizon:g} s; give"
-                " `drive.duration` and `horizon.duration` alike if that is not meant"
+                f"the drive goes {reach:.3g} {drive.unit} for its amplitude of"
+                f" {drive.amplitude:g} {drive.unit}: its duration is {drive.duration:g} s, and the"
+                f" horizon ends at {horizon:g} s; give `drive.duration` and `horizon.duration`"
+                " alike if that is not meant"
             )
 
 
