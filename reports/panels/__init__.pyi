@@ -16,6 +16,7 @@ from .animation_parts import time_axis as time_axis
 from .animation_parts import turn_field as turn_field
 from .animation_parts import with_recordings as with_recordings
 from .convergence import loss_history as loss_history
+from .convergence import loss_label as loss_label
 from .panel_figure import Panel as Panel
 from .panel_figure import PanelFigure as PanelFigure
 from .structure_drawing import CLAMP_TINT as CLAMP_TINT

@@ -24,14 +24,20 @@ SIDES: tuple[tuple[tuple[float, float], dict[str, Any]], ...] = (
 """Where a number may stand beside its mark: shifts in points, and which corner is shifted."""
 
 
-def loss_history(axes: Axes, design: xr.Dataset, label: str = r"Loss $J$") -> None:
+def loss_label(loss: xr.DataArray) -> str:
+    """Names a loss on an axis, with its unit if it has one."""
+    unit = loss.attrs.get("units", "1")
+    return "Loss $J$" if unit == "1" else f"Loss $J$ ({unit})"
+
+
+def loss_history(axes: Axes, design: xr.Dataset) -> None:
     """Draws mean loss thick, each load case thin; what was rejected or infeasible is lighter."""
     for method in design["method"].values:
         history = design.sel({"method": method})
         colour = style.METHOD_COLOURS.get(str(method), style.GREY)
         _history(axes, history, colour, str(method).upper())
     style.log_values(axes)
-    axes.set(xlabel="Evaluation", ylabel=label, xlim=(0, None))
+    axes.set(xlabel="Evaluation", ylabel=loss_label(design["best_loss"]), xlim=(0, None))
     axes.set_ylim(0.55 * float(design["loss"].min()), None)
     for method in design["method"].values:
         _name_best(axes, design.sel({"method": method}))

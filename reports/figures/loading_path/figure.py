@@ -52,13 +52,12 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
     top = 52.0
     low = top + grid.head + grid.lines * grid.side + 2.0
     colours = shade_of(problem, study.response).field.label.replace("u_y", "u<sub>y</sub>")
-    symbol = "Loss (N mm)" if problem.objective.kind == "strain_energy" else r"Loss $J$"
     clamped = _PROSE["rest"].format(
         stiffened=_PROSE["stiffened"] if problem.inclusion is not None else "",
         interest=_PROSE["interest"] if problem.objective.region != "surroundings" else "",
     )
     panels = [
-        *design_panels(study, symbol, clamped),
+        *design_panels(study, clamped),
         Panel(
             ("c", "Response, true to scale", 0.0, top),
             lambda figure: snapshots(figure, study, grid, top + grid.head),
@@ -71,7 +70,7 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
 
 
 def design_panels(
-    study: StudyResults, symbol: str, caption: str, overlay: Callable[[Axes], None] | None = None
+    study: StudyResults, caption: str, overlay: Callable[[Axes], None] | None = None
 ) -> list[Panel]:
     """Lists panels a, the structures with an `overlay` on each, and b, how the loss fell."""
 
@@ -81,7 +80,7 @@ def design_panels(
                 overlay(axes)
 
     def optimisation(figure: Figure) -> None:
-        loss_history(style.place(figure, 133.5, 8.5, 43.5, 31.5), study.design, symbol)
+        loss_history(style.place(figure, 133.5, 8.5, 43.5, 31.5), study.design)
 
     design, history = tables.of_design(study)
     return [

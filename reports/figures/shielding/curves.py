@@ -12,7 +12,7 @@ from reports.base import style
 from reports.facts import measures, percent
 from reports.figures.shielding.facts import monitored, paper_loss
 from reports.figures.shielding.structure_panels import SnapshotRow
-from reports.panels import loss_history, measured_overlay
+from reports.panels import loss_history, loss_label, measured_overlay
 from reports.study import RecordedMotion, ReportScene, from_dataset, middle_of_top_edge
 from sim.core import Floats
 
@@ -108,5 +108,5 @@ def map_panel(figure: Figure, axes: Axes, bar: Axes, scene: ReportScene, sweep: 
     axes.xaxis.set_major_locator(FixedLocator(list(np.arange(0, angle.max() + 1, 45))))
     axes.yaxis.set_major_locator(FixedLocator(list(np.arange(rate.min(), rate.max() + 1, 2))))
     axes.spines[["top", "right"]].set_visible(True)
-    figure.colorbar(filled, cax=bar).set_label(r"Loss $J$", labelpad=2.0)
+    figure.colorbar(filled, cax=bar).set_label(loss_label(sweep["loss"]), labelpad=2.0)
     bar.tick_params(length=1.5)

@@ -93,15 +93,18 @@ def loss_facts(scene: ReportScene, response: xr.Dataset) -> Iterator[Fact]:
         mean = scene.mean(measures.mean_magnitude(response, scene, until))
         yield _told(f"mean_reduction{suffix}", measures.reduction(mean), until=until)
     start, end = mean_losses(scene, response)
-    yield _loss("loss_start", start, until=scene.horizon)
-    yield _loss("loss_end", end, until=scene.horizon, quoted=paper_loss(start))
+    loss = response["loss"]
+    yield _loss("loss_start", start, loss, until=scene.horizon)
+    yield _loss("loss_end", end, loss, until=scene.horizon, quoted=paper_loss(start))
     for key, name in (("start", "altered"), ("end", "cloaked")):
         value = mean_loss(scene, response, "loss_samples", name)
-        yield _loss("loss_samples_{key}", value, key=key, name=name)
+        yield _loss("loss_samples_{key}", value, loss, key=key, name=name)
 
 
-def _loss(key: str, value: float, /, **words: object) -> Fact:
-    return _told(key, value, f"{value:.4f}", **words)
+def _loss(key: str, value: float, of: xr.DataArray, /, **words: object) -> Fact:
+    """Tells a loss in the unit of those that it is of."""
+    unit = str(of.attrs.get("units", "1"))
+    return _told(key, value, f"{value:.4f} {unit}".removesuffix(" 1"), unit=unit, **words)
 
 
 def mean_loss(scene: ReportScene, response: xr.Dataset, variable: str, structure: str) -> float:
@@ -129,7 +132,7 @@ def history_facts(design: xr.Dataset) -> Iterator[Fact]:
         soon = measures.first_within(loss, best, 0.9)
         yield _told("evaluations_{method}", count, at=at, soon=soon, **of)
         note = "shipped" if method == design.attrs.get("shipped_method") else "not shipped"
-        yield _loss("best_{method}", best, note=note, **of)
+        yield _loss("best_{method}", best, design["best_loss"], note=note, **of)
         yield _told("kkt_{method}", float(history["kkt_residual"]), **of)
 
 
@@ -210,8 +213,8 @@ def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:
     loss, ratio = sweep["loss"], sweep["loss"] / sweep["loss_altered"]
     worst = loss.where(loss == loss.max(), drop=True)
     angle, rate = float(worst["direction"][0]), float(worst["frequency"][0])
-    yield _loss("map_max", float(loss.max()), angle=angle, rate=rate)
-    yield _loss("map_min", float(loss.min()))
+    yield _loss("map_max", float(loss.max()), loss, angle=angle, rate=rate)
+    yield _loss("map_min", float(loss.min()), loss)
     yield _told("map_reduction", 1 - float(np.sqrt(ratio.max())))
     for key, axis, unit in (
         ("map_angles", "direction", "°"),

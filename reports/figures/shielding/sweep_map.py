@@ -25,5 +25,5 @@ def frequency_map(sweep: xr.Dataset) -> xr.Dataset:
         values = sweep[name].values
         spread = np.full(size, np.nan if values.dtype.kind == "f" else "", values.dtype)
         spread[tuple(places)] = values
-        made[name] = (tuple(axes), spread)
+        made[name] = (tuple(axes), spread, sweep[name].attrs)
     return made

@@ -49,7 +49,7 @@ def wave_figure(study: StudyResults) -> PanelFigure:
         measure_panel(axes, study, path, measures.measure_of(study.problem))
 
     panels = [
-        *design_panels(study, r"Loss $J$", _PROSE["a"], partial(_mark_places, study)),
+        *design_panels(study, _PROSE["a"], partial(_mark_places, study)),
         Panel(
             ("c", "Response, true to scale; red dots: closed voids", 0.0, top),
             lambda figure: snapshots(

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from reports.base import style
-from reports.figures.shielding import figure
+from reports.figures.shielding import facts, figure
 from reports.figures.shielding.structure_panels import simulated_rows
 from reports.study import StudyResults
 from tests.reports import figure_assertions
@@ -34,6 +34,19 @@ def test_panels_are_lettered_name_their_units_and_show_values(whole: Figure) -> 
     labels = {axes.get_xlabel() for axes in whole.axes} | {axes.get_ylabel() for axes in whole.axes}
     assert {"Time $t$ (s)", "$u_y$ (mm)", "Frequency $f$ (Hz)", "Evaluation"} <= labels
     assert r"Loading angle $\alpha$ (°)" in labels
+
+
+def test_a_loss_that_is_an_energy_has_its_unit(study: StudyResults) -> None:
+    datasets = {kind: data.copy() for kind, data in study.datasets.items()}
+    for kind, name in (("design", "best_loss"), ("response", "loss"), ("sweep", "loss")):
+        datasets[kind][name].attrs["units"] = "N mm"  # type: ignore[index]
+    by_energy = dataclasses.replace(study, datasets=datasets)
+    labels = [axes.get_ylabel() for axes in drawn(by_energy).axes]
+    assert labels.count("Loss $J$ (N mm)") == 2
+    known = {fact.key: fact for fact in facts.shielding_facts(by_energy)}
+    for key in ("loss_start", "loss_end", "best_sqp", "map_max", "map_min"):
+        assert known[key].unit == "N mm"
+        assert known[key].ours.endswith(" N mm")
 
 
 def test_snapshots_are_near_the_peaks_of_one_cycle(study: StudyResults) -> None:
