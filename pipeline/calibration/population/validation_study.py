@@ -57,7 +57,7 @@ from sim.core import Floats, Numbers
 LOG = logging.getLogger(__name__)
 
 BEYOND = (
-    "%.2g %% of the draws of %s have ratios of stiffness beyond the simulated ones, at whose bounds"
+    "%.3g %% of the draws of %s have ratios of stiffness beyond the simulated ones, at whose bounds"
     " their forces stay: give material values nearer to the samples', or narrower priors"
 )
 """Warning of a share of draws, and of what they are."""

@@ -109,8 +109,8 @@ def _of_samples(made: xr.Dataset, asked: Mapping[str, Any]) -> dict[str, Any]:
         ],
         "emulator": f"{100 * made['emulator_error'].values.max():.2g} %",
         "emulator_predicted": f"{100 * made['emulator_error_predicted'].item():.2g} %",
-        "beyond": f"{100 * made['emulator_beyond'].item():.2g} %",
-        "beyond_predicted": f"{100 * made['emulator_beyond_predicted'].item():.2g} %",
+        "beyond": f"{100 * made['emulator_beyond'].item():.3g} %",
+        "beyond_predicted": f"{100 * made['emulator_beyond_predicted'].item():.3g} %",
         "r_hat": f"{made['r_hat'].item():.3f}",
         "diverging": f"{100 * made['diverging'].item():.2g} %",
     }
