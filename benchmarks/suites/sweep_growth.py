@@ -67,10 +67,6 @@ def cases(preset: str | None, count: float, _: str = "loss") -> Run:
 
 def _unchanged(asked: Problem) -> xr.Dataset:
     lattice = lattice_of(asked)
-    free = np.full((lattice.n_ligaments, 2), np.nan)
-    return xr.Dataset(
-        {
-            "vertices": (("unit", "vertex", "xy"), lattice.padded(lattice.vertices)),
-            "end_angles": (("ligament", "end"), free),
-        }
-    )
+    corners = ("unit", "vertex", "xy"), lattice.padded(lattice.vertices)
+    free = ("ligament", "end"), np.full((lattice.n_ligaments, 2), np.nan)
+    return xr.Dataset({"vertices": corners, "vertices_initial": corners, "end_angles": free})
