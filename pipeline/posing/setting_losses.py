@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -37,28 +38,33 @@ def results(
         UnposedError: the setting makes no problem, or one that the design does not fit.
         SimulationError: what the structures should mimic cannot be simulated.
     """
-    try:
+    with _refused():
         problem = posed(asked, setting)
         if not of_problem(problem, design):
             raise UnposedError("the design is of another lattice, or lacks units of this one")
         # No design space is asked for: its symmetry costs more than it could save.
         scene = scene_of(problem, folder).updated(symmetry="none")
+    target = None if scene.objective.reference is None else target_motion(scene, threads)
+    with _refused():
+        structures = structures_of(scene, design)
+    altered, cloaked = (
+        _simulated(structures[name], target, threads) for name in ("altered", "cloaked")
+    )
+    found = [_found(*pair) for pair in zip(altered, cloaked, strict=True)]
+    return found, problem.drive.case_weights
+
+
+@contextmanager
+def _refused() -> Iterator[None]:
+    """Refuses a setting for the reason for which its problem is."""
+    try:
+        yield
     except ValidationError as error:
         raise UnposedError(first_fault(error)[0]) from error
     except UserError as error:
         raise UnposedError(error.what) from error
     except SettingError as error:
         raise UnposedError(str(error)) from error
-    target = None if scene.objective.reference is None else target_motion(scene, threads)
-    try:
-        structures = structures_of(scene, design)
-    except UserError as error:
-        raise UnposedError(error.what) from error
-    altered, cloaked = (
-        _simulated(structures[name], target, threads) for name in ("altered", "cloaked")
-    )
-    found = [_found(*pair) for pair in zip(altered, cloaked, strict=True)]
-    return found, problem.drive.case_weights
 
 
 def mean(found: list[SweepResult], weights: Sequence[float]) -> SweepResult:
