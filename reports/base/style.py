@@ -176,6 +176,11 @@ def log_values(axes: Axes) -> None:
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
+def short_numbers(axes: Axes) -> None:
+    """Takes the power of ten out of numbers on the y axis that are all small, or large."""
+    axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4))
+
+
 def letter(figure: Figure, left: float, top: float, name: str, title: str = "") -> None:
     """Draws bold panel letter, and its title beside it."""
     write(figure, left, top, name, fontsize=PANEL, fontweight="bold")

@@ -7,6 +7,7 @@ from .animation_data import ColourField as ColourField
 from .animation_data import DashedDisc as DashedDisc
 from .animation_data import payload as payload
 from .animation_data import quantisation_error as quantisation_error
+from .animation_data import round_up as round_up
 from .animation_data import scalar as scalar
 from .animation_parts import case_labels as case_labels
 from .animation_parts import signed_field as signed_field

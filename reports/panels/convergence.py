@@ -67,7 +67,7 @@ def _name_best(axes: Axes, history: xr.Dataset) -> None:
     at, best = int(history["best_evaluation"]), float(history["best_loss"])
     colour = style.METHOD_COLOURS.get(str(history["method"].values), style.GREY)
     written = [
-        style.note(axes, (at, best), f"{best:.3f}", shift, color=colour, zorder=7, **corner)
+        style.note(axes, (at, best), f"{best:.3g}", shift, color=colour, zorder=7, **corner)
         for shift, corner in SIDES
     ]
     crossed = [_crossed(axes, label.get_window_extent()) for label in written]

@@ -89,6 +89,7 @@ def colour_bar(
     made = figure.colorbar(ScalarMappable(norm, colours), cax=bar, extend=extend)
     made.set_label(label, labelpad=1.5)
     bar.tick_params(length=1.5)
+    style.short_numbers(bar)
     return made
 
 

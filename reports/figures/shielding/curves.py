@@ -62,6 +62,7 @@ def motion_panel(
     limit = (1.7 if recordings else 1.45) * float(np.abs(series).max())
     axes.set(xlabel="Time $t$ (s)", ylabel="$u_y$ (mm)", xlim=(0, 1.27 * end), ylim=(-limit, limit))
     axes.xaxis.set_major_locator(FixedLocator(list(np.arange(0, end + 1e-9, scene.period / 2))))
+    style.short_numbers(axes)
     axes.spines["bottom"].set_bounds(0, end)
     axes.xaxis.set_label_coords(0.5 / 1.27, -0.13)
     lines = [*axes.get_legend_handles_labels()[0], *measured_overlay.handles(recordings)]
@@ -86,7 +87,7 @@ def _span_arrow(axes: Axes, at: float, curve: Floats, colour: str, span: float) 
     low, high = float(curve.min()), float(curve.max())
     caps = {"arrowstyle": "|-|,widthA=0.15,widthB=0.15", "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (at, high), (at, low), arrowprops=caps | {"color": colour, "lw": 0.8})
-    style.note(axes, (at, high), f"{span:.2f} mm", color=colour)
+    style.note(axes, (at, high), f"{span:.3g} mm", color=colour)
 
 
 def map_panel(figure: Figure, axes: Axes, bar: Axes, scene: ReportScene, sweep: xr.Dataset) -> None:
@@ -106,7 +107,7 @@ def map_panel(figure: Figure, axes: Axes, bar: Axes, scene: ReportScene, sweep: 
     )
     axes.set(xlabel=r"Loading angle $\alpha$ (°)", ylabel="Frequency $f$ (Hz)")
     axes.xaxis.set_major_locator(FixedLocator(list(np.arange(0, angle.max() + 1, 45))))
-    axes.yaxis.set_major_locator(FixedLocator(list(np.arange(rate.min(), rate.max() + 1, 2))))
+    axes.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
     axes.spines[["top", "right"]].set_visible(True)
     figure.colorbar(filled, cax=bar).set_label(loss_label(sweep["loss"]), labelpad=2.0)
     bar.tick_params(length=1.5)

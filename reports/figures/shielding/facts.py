@@ -104,7 +104,7 @@ def loss_facts(scene: ReportScene, response: xr.Dataset) -> Iterator[Fact]:
 def _loss(key: str, value: float, of: xr.DataArray, /, **words: object) -> Fact:
     """Tells a loss in the unit of those that it is of."""
     unit = str(of.attrs.get("units", "1"))
-    return _told(key, value, f"{value:.4f} {unit}".removesuffix(" 1"), unit=unit, **words)
+    return _told(key, value, worded(value, unit, 3), unit=unit, **words)
 
 
 def mean_loss(scene: ReportScene, response: xr.Dataset, variable: str, structure: str) -> float:

@@ -59,7 +59,7 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
     load = f"$α$ = {direction:g}°"
     quoted = study.problem.report.paper is not None
 
-    most = f"Robustness, largest $J$ = {float(sweep['loss'].max()):.3f}"
+    most = f"Robustness, largest $J$ = {float(sweep['loss'].max()):.3g}"
 
     def loss(figure: Figure) -> None:
         loss_panel(style.place(figure, 133.5, 8.5, 43.5, 31.5), design, quoted)

@@ -22,6 +22,7 @@ from reports.panels import (
     draw_clamps,
     drive_arrows,
     outline,
+    round_up,
     tints,
 )
 from reports.study import (
@@ -154,13 +155,12 @@ def snapshots_panel(
 
 
 def _colour_limit(scene: ReportScene, rows: Sequence[SnapshotRow]) -> float:
-    """Returns largest |U| outside the source, rounded up to a tenth."""
+    """Returns largest |U| outside the source, rounded up."""
     sizes = [
         np.linalg.norm(row.displacement[:, row.structure.support != DRIVEN] / scene.scale, axis=-1)
         for row in rows
     ]
-    largest = max(float(np.nanmax(size)) for size in sizes)
-    return float(np.ceil(10 * largest - 1e-9) / 10)
+    return round_up(max(float(np.nanmax(size)) for size in sizes))
 
 
 def _snapshot(

@@ -29,7 +29,7 @@ def test_it_is_legible_at_two_columns(preset: str, request: pytest.FixtureReques
 
 def test_panels_are_lettered_name_their_units_and_show_values(whole: Figure) -> None:
     words = {text.get_text() for text in texts(whole)}
-    assert {*"abcde", "peak-to-peak −88.0 %", "0.82 mm", "0.10 mm"} <= words
+    assert {*"abcde", "peak-to-peak −88.0 %", "0.824 mm", "0.0989 mm"} <= words
     assert "DRAFT" not in words
     labels = {axes.get_xlabel() for axes in whole.axes} | {axes.get_ylabel() for axes in whole.axes}
     assert {"Time $t$ (s)", "$u_y$ (mm)", "Frequency $f$ (Hz)", "Evaluation"} <= labels
@@ -47,6 +47,48 @@ def test_a_loss_that_is_an_energy_has_its_unit(study: StudyResults) -> None:
     for key in ("loss_start", "loss_end", "best_sqp", "map_max", "map_min"):
         assert known[key].unit == "N mm"
         assert known[key].ours.endswith(" N mm")
+
+
+@pytest.fixture(scope="module")
+def faint(study: StudyResults) -> StudyResults:
+    """The study at 1/90 of its amplitude, and its map up to 400 Hz."""
+    datasets = {kind: data.copy(deep=True) for kind, data in study.datasets.items()}
+    datasets["response"]["displacement"] /= 90.0
+    for kind in ("design", "response", "sweep"):
+        for name in datasets[kind]:
+            if "loss" in str(name) and "error" not in str(name):
+                datasets[kind][name] /= 8100.0
+    datasets["sweep"]["value"].loc[{"parameter": "drive.frequency"}] *= 25.0
+    return dataclasses.replace(study, datasets=datasets)
+
+
+def test_a_study_of_small_motion_reads_in_digits_that_count(faint: StudyResults) -> None:
+    made = drawn(faint)
+    figure_assertions.assert_legible(made)
+    words = {text.get_text() for text in texts(made)}
+    assert {"0.00916 mm", "0.0011 mm"} <= words
+    assert not words & {"0.000", "0.00 mm", "Robustness, largest $J$ = 0.000"}
+    known = {fact.key: fact.ours for fact in facts.shielding_facts(faint)}
+    assert known["best_sqp"] == "6.17 × 10⁻⁶"
+    assert not [key for key, ours in known.items() if "loss" in key and float(ours.split()[0]) == 0]
+
+
+def test_colours_of_the_snapshots_reach_as_far_as_the_motion(faint: StudyResults) -> None:
+    made = drawn(faint)
+    bar = next(axes for axes in made.axes if "mathbf{U}" in axes.get_ylabel())
+    largest = max(
+        float(np.linalg.norm(row.displacement / faint.scene.scale, axis=-1).max())
+        for row in simulated_rows(faint.scene, faint.response)
+    )
+    assert bar.get_ylim()[1] <= 1.5 * largest
+
+
+def test_the_map_has_few_ticks_over_any_range(faint: StudyResults, whole: Figure) -> None:
+    for made, wanted in ((drawn(faint), range(0, 401, 100)), (whole, range(2, 17, 2))):
+        axes = next(axes for axes in made.axes if axes.get_ylabel() == "Frequency $f$ (Hz)")
+        low, high = axes.get_ylim()
+        ticks = [tick for tick in axes.get_yticks() if low <= tick <= high]
+        np.testing.assert_allclose(ticks, wanted)
 
 
 def test_snapshots_are_near_the_peaks_of_one_cycle(study: StudyResults) -> None:

@@ -35,6 +35,6 @@ def test_number_of_the_best_loss_stands_clear_of_the_curve(best: int) -> None:
     box = Bbox(label.get_window_extent().get_points())
     drawn = [line for line in axes.lines if line.get_linestyle() != "None"]
     paths = [line.get_transform().transform_path(line.get_path()) for line in drawn]
-    assert label.get_text() in {"0.034", "0.035"}
+    assert label.get_text() == "0.0345"
     assert not any(path.intersects_bbox(box, filled=False) for path in paths)
     assert axes.bbox.x1 >= box.x1 - 1.0
