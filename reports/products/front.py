@@ -21,8 +21,9 @@ PER_ROW = 3
 """Panels in a row, at most; four stand two by two."""
 _PROSE = prose(__file__)
 _COLUMNS = (
-    "design", "differs by", "value", "drive's own loads", "worst found", "before any design",
-    "worst of random loads", "over their mean", "worst of the certificate's searches",
+    "design", "differs by", "value", "drive's own loads{unit}", "worst found{unit}",
+    "before any design{unit}", "worst of random loads{unit}", "over their mean",
+    "worst of the certificate's searches{unit}",
 )  # fmt: skip
 _NAMES = {
     "cloak.disc.radius": "radius of the cloak",
@@ -44,9 +45,15 @@ def report(args: argparse.Namespace) -> None:
     title = titled(problem.load(args.problem), args.problem)
     lead = _PROSE["lead"].format(count=data.sizes["design"])
     text = FigureText(title, _PROSE["subject"], lead, drawn.caption)
-    shown = PageTable(_COLUMNS, [_row(data.sel(design=name), certified) for name in _designs(data)])
+    shown = losses_table(data, certified)
     made = figure_page("front", text, drawn.draw, drawn.tables, data, shown=shown)
     publish(made, args.out_dir)
+
+
+def losses_table(data: xr.Dataset, certified: Mapping[str, xr.Dataset]) -> PageTable:
+    """Tabulates the losses of every design, and those that its certificate found."""
+    heads = [column.format(unit=_unit(data)) for column in _COLUMNS]
+    return PageTable(heads, [_row(data.sel(design=name), certified) for name in _designs(data)])
 
 
 def _designs(data: xr.Dataset) -> list[str]:

@@ -1,6 +1,7 @@
 """Draws what robust presets gain: losses of the altered structure and of both designs."""
 
 import argparse
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -10,13 +11,13 @@ from matplotlib.ticker import MaxNLocator
 
 from pipeline import datasets, problem
 from reports.base import Table, prose, style
-from reports.facts import headed_columns
+from reports.facts import headed_columns, worded
 from reports.page import FigureText, PageTable, figure_page, publish, titled
 
 _PROSE = prose(__file__)
 _COLUMNS = (
-    "preset", "asks for", "loads", "copies", "loss of the study's own design",
-    "loss of the preset's design", "gain", "loss under the study's own drive",
+    "preset", "asks for", "loads", "copies", "loss of the study's own design{unit}",
+    "loss of the preset's design{unit}", "gain", "loss under the study's own drive{unit}",
 )  # fmt: skip
 _ROW, _LEFT, _WIDE, _GAP = 11.0, 42.0, 60.0, 10.0
 _AGAINST = {
@@ -30,14 +31,24 @@ def report(args: argparse.Namespace) -> None:
     """Makes the report that a command line asks for."""
     data = datasets.read(args.gains, "gains")
     columns = headed_columns(data, *(str(name) for name in data.variables if data[name].dims))
-    lead = _PROSE["lead"].format(loss=float(data["loss_drive"]))
+    lead = _PROSE["lead"].format(loss=worded(float(data["loss_drive"]), _loss_unit(data), 4))
     title = titled(problem.load(args.problem), args.problem)
     text = FigureText(title, _PROSE["subject"], lead, _PROSE["caption"])
     tables = [Table("gains.csv", "losses of every preset", columns)]
-    rows = [_row(data.sel(preset=name)) for name in data["preset"].values]
-    shown = PageTable(_COLUMNS, rows)
-    made = figure_page("gains", text, lambda: draw_robust_gains(data), tables, data, shown=shown)
+    drawn = partial(draw_robust_gains, data)
+    made = figure_page("gains", text, drawn, tables, data, shown=gains_table(data))
     publish(made, args.out_dir)
+
+
+def gains_table(data: xr.Dataset) -> PageTable:
+    """Tabulates losses and gain of every preset."""
+    unit = _loss_unit(data)
+    heads = [column.format(unit="" if unit == "1" else f" ({unit})") for column in _COLUMNS]
+    return PageTable(heads, [_row(data.sel(preset=name)) for name in data["preset"].values])
+
+
+def _loss_unit(data: xr.Dataset) -> str:
+    return str(data["loss_own"].attrs["units"])
 
 
 def _row(data: xr.Dataset) -> tuple[str, ...]:
@@ -67,7 +78,7 @@ def _rows(axes: Axes, data: xr.Dataset) -> np.ndarray:
 
 def _losses(axes: Axes, data: xr.Dataset) -> None:
     place = _rows(axes, data)
-    unit = data["loss_own"].attrs["units"]
+    unit = _loss_unit(data)
     axes.set(xscale="log", xlabel="loss" if unit == "1" else f"loss ({unit})")
     axes.set_yticklabels([str(name) for name in data["preset"].values])
     axes.hlines(place, data["loss_own"], data["loss_altered"], color=style.PALE, linewidth=1.0)

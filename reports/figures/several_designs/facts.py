@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from pipeline.posing import loss_units
 from reports.facts import Fact, checks, facts_of, grouped
 from reports.figures.several_designs.designs import DesignSeries, SeriesDesign
 from reports.study import evaluation_count, from_dataset
@@ -61,8 +62,9 @@ def _design(design: SeriesDesign) -> Iterator[Fact]:
         yield told("design_{number}.radius", design.study.problem.cloak.bounds[2])
     yield told("design_{number}.boundary", cloaked)
     yield told("design_{number}.boundary_reduction", 1.0 - cloaked / altered)
-    yield told("design_{number}.loss", design.loss("cloaked"))
-    yield told("design_{number}.loss_altered", design.loss("altered"))
+    unit = loss_units(design.study.problem)
+    yield told("design_{number}.loss", design.loss("cloaked"), unit=unit)
+    yield told("design_{number}.loss_altered", design.loss("altered"), unit=unit)
     found = design.study.design
     yield told("design_{number}.evaluations", evaluation_count(found))
     for fact in checks.design_facts(found):

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.posing import loss_units
 from reports.base import Table
-from reports.facts import fact_records, measures
+from reports.facts import fact_records, headed, measures
 from reports.figures.loading_path import credit
 from reports.figures.several_designs import designs
 from reports.figures.several_designs.designs import DesignSeries
@@ -52,7 +53,9 @@ def _sizes(series: DesignSeries) -> Table:
     for name in ("altered", "cloaked"):
         reached = [float(each.boundary.sel(structure=name)) for each in series.designs]
         columns[f"U_max_{name}"] = reached
-        columns[f"J_{name}"] = [design.loss(name) for design in series.designs]
+        columns[headed(f"J_{name}", loss_units(series.problem))] = [
+            design.loss(name) for design in series.designs
+        ]
     return Table("sizes.csv", "boundary displacement and loss of every design (panel a)", columns)
 
 

@@ -6,7 +6,7 @@ import xarray as xr
 
 from pipeline.posing import greatest_loss
 from reports.facts import Fact, facts_of, grouped, measures
-from reports.products.certificate.figure import CertifiedDesign, load_text
+from reports.products.certificate.figure import CertifiedDesign, load_text, loss_unit
 
 NEAR = 0.95
 """Of the greatest loss that was found: searches that end above it found the same worst."""
@@ -31,26 +31,29 @@ def _family(of: xr.Dataset) -> Iterator[Fact]:
     lost = int(losses.isnull().sum())
     without = f"; {lost} could not be simulated and count in none of these numbers" if lost else ""
     yield _told("loads", of.sizes["load"], without=without)
-    yield _told("mean", mean)
-    yield _told("share_95", float(losses.quantile(0.95)))
-    yield _told("worst_random", worst)
+    unit = loss_unit(of)
+    yield _told("mean", mean, unit=unit)
+    yield _told("share_95", float(losses.quantile(0.95)), unit=unit)
+    yield _told("worst_random", worst, unit=unit)
     yield _told("worst_over_mean", worst / mean)
 
 
 def _worst(found: CertifiedDesign) -> Iterator[Fact]:
     ends = found.own["found_loss"]
     yield _told("searches", ends.size)
-    yield _told("worst_found", found.most, load=load_text(found))
+    yield _told("worst_found", found.most, load=load_text(found), unit=loss_unit(found.own))
     yield _told("near", int((ends > NEAR * found.most).sum()))
     reduction = measures.reduction(found.worst.response["loss"].isel(case=0))
     yield _told("reduction", reduction)
 
 
 def _own(of: xr.Dataset) -> Iterator[Fact]:
-    yield _told("nominal", float(of["nominal_loss"]))
-    yield _told("nominal_worst", float(of["nominal_worst"]))
+    unit = loss_unit(of)
+    yield _told("nominal", float(of["nominal_loss"]), unit=unit)
+    yield _told("nominal_worst", float(of["nominal_worst"]), unit=unit)
 
 
 def _study(of: xr.Dataset) -> Iterator[Fact]:
-    yield _told("study_worst", greatest_loss(of))
-    yield _told("study_nominal", float(of["nominal_loss"]))
+    unit = loss_unit(of)
+    yield _told("study_worst", greatest_loss(of), unit=unit)
+    yield _told("study_nominal", float(of["nominal_loss"]), unit=unit)

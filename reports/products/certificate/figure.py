@@ -178,8 +178,13 @@ def _structures(found: CertifiedDesign) -> list[str]:
     return [name for name in ("altered", "cloaked") if name in found.missed["structure"]]
 
 
+def loss_unit(data: xr.Dataset) -> str:
+    """Returns the unit of the losses of a certificate, "1" if they have none."""
+    return str(data["loss"].attrs.get("units", "1"))
+
+
 def _label(data: xr.Dataset) -> str:
-    unit = data["loss"].attrs.get("units", "1")
+    unit = loss_unit(data)
     return "loss" if unit == "1" else f"loss ({unit})"
 
 

@@ -14,8 +14,10 @@ from typing import Any
 from pipeline import problem
 from pipeline.fabrication.papers import read_bill, read_manifest
 from pipeline.fabrication.parts import STRAIGHT, THIN_WALL
+from pipeline.posing import loss_units
 from pipeline.problem import Problem
 from pipeline.runtime import cli
+from reports.facts import worded
 from reports.page import titled, write_page
 from reports.products.fabrication import pictures
 
@@ -61,13 +63,13 @@ def report(args: argparse.Namespace) -> None:
         "lead": "Drawings for the laser cutter, plates for the printer, fixtures and papers.",
         "pens": [(name, colour) for name, colour in pictures.PENS.items() if name != "REFERENCE"],
         "structures": made,
-        "as_built": list(_as_built({made["name"]: read_manifest(p) for made, p in packages})),
+        "as_built": list(as_built(asked, {each["name"]: read_manifest(p) for each, p in packages})),
         "parameters": list(parameters(asked.fabrication.model_dump(mode="json"))),
     }
     write_page(args.out, "fabrication.html.j2", values)
 
 
-def _as_built(told: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, ...]]:
+def as_built(asked: Problem, told: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, ...]]:
     """Yields rows of a table by structure: what is told, as designed, as built."""
     found = {name: each["as_built"] for name, each in told.items() if each["as_built"]}
     for name, each in found.items():
@@ -78,7 +80,7 @@ def _as_built(told: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, ...]
         turn = f"{each['turn_mean_deg']:.2f}° on average, {each['turn_max_deg']:.2f}° at most"
         yield f"{title}: units turn before any load by", "0", turn
         if name != "intact":
-            losses = (f"{each[f'loss_as_{how}']:.4g}" for how in _HOWS)
+            losses = (worded(each[f"loss_as_{how}"], loss_units(asked), 4) for how in _HOWS)
             yield f"{title}: loss J", *losses
     pair = [found.get(name, {}) for name in ("cloaked", "altered")]
     if all("loss_as_built" in each for each in pair):

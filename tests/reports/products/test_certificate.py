@@ -45,3 +45,13 @@ def test_searches_are_near_the_worst_that_anything_found(
     known = {each.key: each for each in certificate_facts(certified([0.2, random], ends))}
     assert known["worst_found"].value == max(random, 1.0)
     assert known["near"].value == near
+
+
+def test_losses_that_are_energies_have_their_unit() -> None:
+    found = certified([0.2, 0.5], [1.0, 0.9])
+    found.data["loss"].attrs["units"] = "N mm"
+    known = {each.key: each for each in certificate_facts(found)}
+    for key in ("mean", "share_95", "worst_random", "worst_found", "nominal", "nominal_worst"):
+        assert known[key].unit == "N mm"
+        assert known[key].ours.endswith(" N mm")
+    assert known["worst_over_mean"].unit == "1"

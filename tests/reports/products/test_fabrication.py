@@ -10,14 +10,16 @@ import pytest
 import trimesh
 from PIL import Image
 
+from pipeline import problem
 from reports.__main__ import main
-from reports.products.fabrication import pictures
+from reports.products.fabrication import fabrication_report, pictures
 from reports.products.fabrication.renderer import Body, picture
 from tests.pipeline.fabrication import built
 from tests.reports.conftest import Failing
 from tests.tables import cases
 
 COLOUR = "#8d62c0"
+FIG4 = Path(__file__).parents[3] / "experiments" / "fig4" / "problem.yaml"
 
 
 def cube(size: float = 10.0) -> Body:
@@ -123,3 +125,11 @@ def test_the_page_puts_losses_as_built_beside_those_as_designed(tmp_path: Path) 
     page = page_of(tmp_path / "index.html", tmp_path / "altered", tmp_path / "cloaked")
     for cell in ("0.39° on average, 4.59° at most", "0.0347", "0.111", "3.8 %", "12.3 %"):
         assert f"<td>{cell}</td>" in page
+
+
+def test_losses_that_are_energies_have_their_unit() -> None:
+    turns = {"turn_mean_deg": 0.4, "turn_max_deg": 4.6}
+    told = {"cloaked": {"as_built": turns | {"loss_as_designed": 0.0347, "loss_as_built": 0.111}}}
+    asked = problem.load(FIG4)
+    rows = list(fabrication_report.as_built(asked, told))
+    assert ("Cloaked structure: loss J", "0.0347 N mm", "0.111 N mm") in rows
