@@ -22,11 +22,14 @@ def recorded_facts(recordings: Sequence[RecordedMotion]) -> list[Fact]:
     ]
 
 
-def intervals(measured: Floats, predicted: Floats, unit: str = "") -> str:
-    """Finds the ends (2,) of an interval, and of that which imperfect specimens span, in words."""
+def intervals(measured: Floats, predicted: Floats, level: float, unit: str = "") -> str:
+    """Finds the ends (2,) of an interval, and of that which imperfect specimens span, in words.
+
+    That holds a part `level` of them.
+    """
     words = f"95 %: {measured[0]:.3g} to {measured[1]:.3g}{unit}"
     if np.isfinite(predicted).all():
-        words += f"; predicted {predicted[0]:.3g} to {predicted[1]:.3g}{unit}"
+        words += f"; predicted, {100 * level:g} %: {predicted[0]:.3g} to {predicted[1]:.3g}{unit}"
     return words
 
 
@@ -64,7 +67,8 @@ def _alignment(recording: RecordedMotion) -> Iterator[Fact]:
     if samples := int(data["band_samples"]):
         usual = 100 * float(np.nanmean(data["band_coverage_usual"].values))
         covered = float(np.nanmean(data["band_coverage"].values))
-        yield told("{name}_coverage", covered, samples=samples, usual=usual)
+        words = {"samples": samples, "level": 100 * recording.level, "usual": usual}
+        yield told("{name}_coverage", covered, **words)
     force = float(data["force_rmse"].sel(side="simulated", estimate="value"))
     if np.isfinite(force):
         part = 100 * float(data["force_nrmse"].sel(side="simulated", estimate="value"))

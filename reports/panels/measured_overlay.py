@@ -91,4 +91,5 @@ def caption(recordings: Sequence[RecordedMotion]) -> str:
     if not recordings:
         return ""
     told = ["experiment", *["synthetic"] * any(each.synthetic for each in recordings)]
-    return "".join(f" {_PROSE[name].format(label=LABEL)}" for name in told)
+    words = {"label": LABEL, "level": 100 * recordings[0].level}
+    return "".join(f" {_PROSE[name].format_map(words)}" for name in told)

@@ -28,6 +28,7 @@ class RecordedMotion:
     # falling
     along: Floats
     frames: NDArray[np.int64]  # (n_frames,) the frames that these are, of those in the dataset
+    level: float  # part of the imperfect specimens between the limits of a prediction band
     take: int = 0  # number among those of its structure and load case, zero of the only one
 
     @property
@@ -110,4 +111,4 @@ def _recorded(
         along = data["drive_displacement"].values @ np.array([np.cos(angle), np.sin(angle)])
     kept = np.flatnonzero(np.isfinite(along) & (data["branch"].values != _UNLOADING))
     order = kept[np.argsort(along[kept], kind="stable")]
-    return RecordedMotion(name, data, along[order], order)
+    return RecordedMotion(name, data, along[order], order, problem.prediction.level)

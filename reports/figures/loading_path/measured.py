@@ -177,7 +177,7 @@ def _interval(recording: RecordedMotion, path: Abscissa, key: str) -> str:
     if key not in _NAMES or not path.static:
         return ""
     measured, predicted = (_at_the_end(recording, path, key, side) for side in _SIDES)
-    return intervals(measured[1:], predicted[1:])
+    return intervals(measured[1:], predicted[1:], recording.level)
 
 
 def _change(
@@ -194,4 +194,4 @@ def _change(
     for side in _SIDES:
         of = {each.structure: _at_the_end(each, path, key, side) for each in recorded}
         ends.append(np.sort(100 * sign * compute_reduction(*(of[name] for name in between))[1:]))
-    return intervals(ends[0], ends[1], " %")
+    return intervals(ends[0], ends[1], recorded[0].level, " %")

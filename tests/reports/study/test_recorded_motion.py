@@ -164,3 +164,20 @@ def test_comparisons_are_read_from_their_folders(tmp_path: Path) -> None:
     problem.write_text(problem.read_text() + "prediction: { samples: 3 }\n")
     with pytest.raises(UserError, match=r"made from another problem[\s\S]*comparison\.nc"):
         load(problem, None, files, [file])
+
+
+def test_prediction_bands_are_told_of_with_their_own_level(
+    filmed: dict[str, StudyResults],
+) -> None:
+    study = filmed["study"]
+    level = study.problem.prediction.model_copy(update={"level": 0.8})
+    asked = study.problem.model_copy(update={"prediction": level})
+    compared = {name: data.assign(band_samples=64) for name, data in study.compared.items()}
+    study = replace(study, problem=asked, compared=compared)
+    figure = kinds.kind_of(asked).figure(study)
+    assert "the bands hold 80 % of simulations" in figure.caption
+    notes = {fact.key: fact.note for fact in kinds.kind_of(asked).facts(study)}
+    assert "of which 80 % have" in notes["altered_1_coverage"]
+    note = notes["measured_peak_to_peak_altered"]
+    assert "95 %: " in note
+    assert "; predicted, 80 %: " in note
