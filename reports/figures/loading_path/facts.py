@@ -3,6 +3,7 @@
 A publication's words for them stand in the problem, under `report.paper.values`, by their key.
 """
 
+import math
 from collections.abc import Iterable, Iterator
 
 import numpy as np
@@ -10,7 +11,13 @@ import xarray as xr
 
 from pipeline.comparison import middle_units
 from pipeline.problem import Problem
-from pipeline.problem.sections import HarmonicDrive, Quads, RampHarmonicDrive, Region
+from pipeline.problem.sections import (
+    HarmonicDrive,
+    Quads,
+    RampHarmonicDrive,
+    Region,
+    resolve_centre,
+)
 from reports.facts import (
     Fact,
     checks,
@@ -112,16 +119,20 @@ def _radii(problem: Problem) -> Iterator[Fact]:
 
 
 def _cloak_width(problem: Problem) -> float | None:
-    """Finds the width of a cloak around something round, mm."""
+    """Finds the least width of a cloak around a void, an inclusion or a region of interest, mm."""
     if problem.cloak.around is not None:
         return problem.cloak.around.distance
-    cloak = problem.cloak.bounds
-    if cloak is None:
+    if problem.cloak.bounds is None:
         return None
-    within = (problem.void, problem.objective.region)
-    rounds = [region.bounds for region in within if isinstance(region, Region)]
-    inner = max([cloak[1], *(bounds[2] for bounds in rounds if bounds is not None)])
-    return cloak[2] - inner if inner > 0 else None
+    middle = problem.lattice.centre_site
+    centre, inner, outer = problem.cloak.bounds
+    around = resolve_centre(centre, middle)
+    inclusion = problem.inclusion and problem.inclusion.region
+    for region in (problem.void, inclusion, problem.objective.region):
+        if isinstance(region, Region):
+            ends = [point for outline in region.outlines(middle) for point in outline]
+            inner = max([inner, *(math.dist(point, around) for point in ends)])
+    return round(outer - inner, 9) if 0.0 < inner < outer else None
 
 
 def _load_fact(path: Abscissa) -> Fact:

@@ -98,6 +98,16 @@ def test_contraction_of_middle_columns_and_force_on_units(smile: StudyResults) -
     np.testing.assert_allclose(forces.isel(time=0), 0.0)
 
 
+def test_a_cloak_is_as_wide_as_where_it_is_narrowest(
+    shield: StudyResults, smile: StudyResults
+) -> None:
+    """Between circles, and between the smile's corners and a circle about the middle of it."""
+    assert values(shield)["cloak_width"].value == pytest.approx(91.0 - 67.5)
+    narrowest = values(smile)["cloak_width"]
+    assert narrowest.value == pytest.approx(73.5 - np.hypot(60.0, 15.0))
+    assert narrowest.note == "0.7769 spacings, where it is narrowest"
+
+
 def test_the_axis_is_the_displacement_of_the_driven_units(shield: StudyResults) -> None:
     way = abscissa.abscissa_of(shield.problem, shield.response)
     np.testing.assert_allclose(way.values, np.linspace(0, 15, 9), atol=1e-12)
