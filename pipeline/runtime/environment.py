@@ -13,7 +13,7 @@ from pipeline.runtime.locations import CACHE
 from sim.core import instruction_set
 
 RUN_MARK = "METACLOAK_RUN"
-"""Names folder and process (FOLDER:NUMBER) of their run in the environment of all jobs."""
+"""Names folder and run (FOLDER:NUMBER on HOST) in the environment of all jobs."""
 
 ONE_THREAD = {
     "MKL_NUM_THREADS": "1",

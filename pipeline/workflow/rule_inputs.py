@@ -25,6 +25,7 @@ from pipeline.problem.sections import design_name, group_count, split_name
 from pipeline.problem.sections import designs as designs_section
 from pipeline.runtime import RUN_MARK, WORK, UserError
 from pipeline.workflow import study_lock
+from pipeline.workflow.live_runs import Run
 from pipeline.workflow.product_checks import check_products, presets_in_ranges, robust_presets
 from pipeline.workflow.recordings import recording_pages, shown_recordings
 from pipeline.workflow.studies import (
@@ -290,4 +291,4 @@ def prepare_jobs(main: bool) -> None:
     """
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     if main or RUN_MARK not in os.environ:
-        os.environ[RUN_MARK] = f"{WORK}:{os.getpid()}"
+        os.environ[RUN_MARK] = f"{WORK}:{Run.own()}"

@@ -14,7 +14,8 @@ from typing import NoReturn
 import psutil
 
 from pipeline.runtime import INSTALLED, ROOT, RUN_MARK, WORK, UserError, streams
-from pipeline.workflow import stale_jobs
+from pipeline.workflow import stale_jobs, study_lock
+from pipeline.workflow.live_runs import Run
 from pipeline.workflow.rule_inputs import check_problems
 
 _PATIENCE = 5.0  # seconds that a left-over job gets to end by itself
@@ -49,18 +50,12 @@ def _clear_the_ground() -> None:
     Raises:
         UserError: jobs on a cluster may be those of another run, or the cluster does not answer.
     """
-    active = [process.pid for process in _others() if _is_snakemake(process)]
-    if active and stale_jobs.remaining(WORK):
-        raise UserError(
-            f"jobs on the cluster may be those of the run at work here (process {active[0]})",
-            file=WORK,
-            remedy=f"wait for it, or end it with: kill -INT {active[0]}",
-        )
-    for number in stale_jobs.cancel(WORK):
+    if left := stale_jobs.remaining(WORK):
+        study_lock.check_free(WORK)  # afterwards: a run holds its locks before it has jobs
+        stale_jobs.cancel(WORK, left)
+    for number in left:
         print(f"cancelled job {number} of a killed run", file=sys.stderr)  # noqa: T201
-    runs = [f"{WORK}:{number}" for number in active]
-    marks = {process: _mark(process) for process in _others()}
-    orphans = [p for p, m in marks.items() if m.startswith(f"{WORK}:") and m not in runs]
+    orphans = [process for process in _others() if _is_left_over(process)]
     for process in orphans:
         process.terminate()
     _, stubborn = psutil.wait_procs(orphans, timeout=_PATIENCE)
@@ -75,20 +70,14 @@ def _others() -> list[psutil.Process]:
     return [process for process in psutil.process_iter() if process not in own]
 
 
-def _is_snakemake(process: psutil.Process) -> bool:
+def _is_left_over(process: psutil.Process) -> bool:
+    """Tells whether a process is a job of a run in this folder and on this host that has ended."""
     try:
-        names = {Path(word).name for word in process.cmdline()[:2]}
-        return "snakemake" in names and Path(process.cwd()) == WORK
-    except psutil.Error:
+        folder, _, name = process.environ().get(RUN_MARK, "").rpartition(":")
+    except psutil.Error:  # it is not ours, or has ended
         return False
-
-
-def _mark(process: psutil.Process) -> str:
-    """Reads for which run a job works; empty if the process is no job or is not ours."""
-    try:
-        return process.environ().get(RUN_MARK, "")
-    except psutil.Error:
-        return ""
+    run = Run.parse(name)
+    return folder == str(WORK) and run is not None and run.here and not run.may_live
 
 
 def _end_with_make() -> None:

@@ -2,6 +2,7 @@
 
 import subprocess
 import time
+from collections.abc import Collection
 from pathlib import Path
 
 from pipeline.runtime import UserError
@@ -16,22 +17,19 @@ _PATIENCE = 60.0  # seconds that cancelled jobs get to end
 _FORMAT = "%i|%j|%Z"  # number, name, working directory
 
 
-def cancel(folder: Path) -> list[str]:
-    """Cancels our jobs for a folder, waits until none is left, and returns their numbers.
+def cancel(folder: Path, numbers: Collection[str]) -> None:
+    """Cancels jobs for a folder, and waits until none of them is left.
 
     Raises:
         UserError: SLURM does not answer, or a job does not end.
     """
-    if not (found := remaining(folder)):
-        return []
-    _ask("scancel", *found)
+    _ask("scancel", *numbers)
     until = time.monotonic() + _PATIENCE
-    while left := jobs(folder):
+    while left := [number for number in jobs(folder) if number in numbers]:
         if time.monotonic() > until:
             remedy = "wait for it, and run the same command again"
             raise UserError(f"job {left[0]} of a killed run does not end", remedy=remedy)
         time.sleep(0.5)
-    return found
 
 
 def remaining(folder: Path) -> list[str]:

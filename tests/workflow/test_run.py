@@ -56,7 +56,7 @@ def test_run_goes_on_after_a_kill_beside_another_study(sandbox: Sandbox) -> None
 def test_a_study_is_built_once_at_a_time_and_an_interrupt_leaves_no_job(sandbox: Sandbox) -> None:
     sandbox.stage_seconds = 60.0
     run = start(sandbox, DESIGN)
-    at_work = f"another run is at work on fig2 (process {run.pid})"
+    at_work = f"another run is at work on fig2 (process {run.pid} on "
     for refused in (sandbox.resume(DESIGN), sandbox.run("fig2")):
         assert refused.returncode != 0
         assert refused.stderr.count("error: ") == 1

@@ -32,12 +32,14 @@ def test_jobs_of_this_folder_and_of_a_run_are_cancelled(queue: Path) -> None:
     here = used(queue.parent)
     others = f"3|cloak_a|/elsewhere\n4|mine|{here}\n"
     queue.write_text(f"1|cloak_a|{here}\n2|cloak_b|{here}\n{others}")
-    assert stale_jobs.cancel(here) == ["1", "2"]
+    found = stale_jobs.remaining(here)
+    assert found == ["1", "2"]
+    stale_jobs.cancel(here, found)
     assert queue.read_text() == others
-    assert stale_jobs.cancel(here) == []
+    assert stale_jobs.remaining(here) == []
 
 
 def test_a_cluster_that_does_not_answer_is_told(queue: Path) -> None:
-    assert stale_jobs.cancel(queue.parent) == []  # no run used a cluster: none is asked
+    assert stale_jobs.remaining(queue.parent) == []  # no run used a cluster: none is asked
     with pytest.raises(UserError, match="SLURM does not answer"):
-        stale_jobs.cancel(used(queue.parent))  # there is no queue to list
+        stale_jobs.remaining(used(queue.parent))  # there is no queue to list
