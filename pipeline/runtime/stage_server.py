@@ -97,10 +97,18 @@ def delegate(program: str, imports: str) -> int | None:
         with _passed_on(server):
             code = server.recv(2, socket.MSG_WAITALL)
     status = int.from_bytes(code, signed=True) if len(code) == 2 else -signal.SIGKILL
-    if status < 0:  # ends by the signal that ended the stage
-        signal.signal(-status, signal.SIG_DFL)
-        os.kill(os.getpid(), -status)
+    if status < 0:
+        _end_by(-status)
     return status
+
+
+def _end_by(number: int) -> None:
+    """Ends this process by the signal that ended its stage."""
+    if number == signal.SIGKILL:  # which has its one way to be handled, and tells nothing itself
+        print("killed, mostly for want of memory", file=sys.stderr, flush=True)  # noqa: T201
+    else:
+        signal.signal(number, signal.SIG_DFL)
+    os.kill(os.getpid(), number)
 
 
 @contextmanager
@@ -146,6 +154,8 @@ class _Server:
         """Serves until the workflow has ended, and its stages. In a fork: returns what to run."""
         while self._listener.fileno() >= 0 or self._jobs:
             for key, _ in self._waiting.select():
+                if self._waiting.get_map().get(key.fd) is not key:  # its stage has just ended
+                    continue
                 if request := key.data():
                     return cast(_Request, request)
         return None

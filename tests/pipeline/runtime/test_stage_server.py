@@ -3,6 +3,7 @@
 import atexit
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -28,6 +29,8 @@ if what == "sleep":
         sys.exit(130)
 if what == "segfault":
     os.kill(os.getpid(), signal.SIGSEGV)
+if what == "killed":
+    os.kill(os.getpid(), signal.SIGKILL)
 sys.exit(int(what))
 """
 CLIENT = """
@@ -126,6 +129,37 @@ def test_a_signal_reaches_the_stage(folder: Path, number: int, code: int) -> Non
     if number == signal.SIGKILL:  # the server sees it a little later
         psutil.wait_procs([stage], timeout=30)
     assert not stage.is_running()
+
+
+@pytest.mark.usefixtures("server")
+def test_a_stage_that_the_machine_kills_is_told(folder: Path) -> None:
+    process = client(folder, "killed")
+    told = process.communicate(timeout=60)[1]
+    assert process.returncode == -signal.SIGKILL
+    assert told == "complains\nkilled, mostly for want of memory\n"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="there is no server")
+def test_a_stage_may_end_as_its_client_is_signalled() -> None:
+    life, held = os.pipe()
+    listener = socket.socket(socket.AF_UNIX)
+    listener.bind("")
+    listener.listen()
+    server = stage_server._Server(listener, life)
+    ours, client = socket.socketpair()
+    if not (process := os.fork()):
+        os._exit(3)
+    job = stage_server._Job(process, ours, os.pidfd_open(process))
+    server._jobs.add(process)
+    server._wait_for(job.ended, lambda: server._tell(job))
+    server._wait_for(ours.fileno(), lambda: server._hand_on(job))
+    os.waitid(os.P_PID, process, os.WEXITED | os.WNOWAIT)
+    client.sendall(bytes([signal.SIGTERM]))
+    os.close(held)
+    assert server.serve() is None
+    assert int.from_bytes(client.recv(2), signed=True) == 3
+    os.close(life)
+    client.close()
 
 
 def test_a_client_without_a_server_does_the_work_itself(folder: Path) -> None:
