@@ -113,7 +113,7 @@ def under_worst(asked: Problem, certificate: xr.Dataset) -> Problem:
 
 
 def _along(drive: Drive, load: dict[str, float]) -> Drive:
-    """Turns a drive along a load, or mixes two by it."""
+    """Turns a drive along a load, or mixes two by it; in periods it takes as long as before."""
     way, amplitude = float(np.deg2rad(load["direction"])), load["amplitude"]
     if isinstance(drive, SeveralDrives):
         parts = amplitude * np.cos(way), amplitude * np.sin(way)
@@ -122,8 +122,11 @@ def _along(drive: Drive, load: dict[str, float]) -> Drive:
         return drive.model_copy(update={"drives": drives})
     assert isinstance(drive, DisplacementDrive)
     changed: dict[str, object] = {"directions": (way,), "weights": None, "amplitude": amplitude}
-    if np.isfinite(load["frequency"]):
+    if isinstance(drive, HarmonicDrive | RampHarmonicDrive):
         changed["frequency"] = load["frequency"]
+    if isinstance(drive, RampHarmonicDrive):
+        longer = drive.frequency / load["frequency"]
+        changed |= {"rise_time": drive.rise_time * longer, "delay": drive.delay * longer}
     return drive.model_copy(update=changed)
 
 

@@ -4,15 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from pipeline.posing import design_scene
+from pipeline.posing import design_scene, load_family, scene_of, under_worst
 from pipeline.problem.reading import load, overlay_keys
 from reports.__main__ import main
 from sim.solvers import Harmonic
 from tests.pipeline.conftest import Failing
+from tests.pipeline.samples import sample
 from tests.pipeline.static import HOLE, designed, write
 from tests.tables import refused
 
@@ -106,6 +108,21 @@ def test_a_pulse_is_a_load_of_its_own(fig2: Path) -> None:
     times = np.linspace(0.0, 0.4, 401)
     largest = max(np.abs(drive.motion(times)).max() for drive in scene.loads.cases)
     assert largest == pytest.approx(4.5)
+
+
+def test_a_response_is_to_the_load_that_was_certified(fig2: Path) -> None:
+    file = fig2.parents[1] / "fig7/problem.yaml"
+    asked, worst = load(file, "unbiased"), sample("certificate")
+    family = load_family(asked, file.parent)
+    assert family is not None
+    certified = family.setups[1].fastest(1)
+    assert isinstance(certified, Harmonic)
+    at = {"direction": 0.0, "amplitude": 4.5, "frequency": 15.0, "setup": 1}
+    for part, value in at.items():
+        for kind in ("load", "found"):
+            worst[f"{kind}_{part}"] = xr.full_like(worst[f"{kind}_{part}"], value)
+    posed = scene_of(under_worst(asked, worst), file.parent)
+    assert posed.loads.motions == (certified._replace(direction=0.0),)
 
 
 OFF_CENTRE = {"disc": {"centre": ["30 mm", "58 mm"], "radius": "8 mm"}}
