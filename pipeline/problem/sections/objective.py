@@ -137,4 +137,4 @@ class ObjectiveSection(Section):
     robust: Robust | None = None
     loads: LoadRanges | None = None
     snap: Literal["allow", "avoid"] = "allow"
-    snap_margin: Ratio = 0.05
+    snap_margin: Positive = 0.05
