@@ -39,13 +39,21 @@ def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = N
 
 
 def _unused(problem: Problem, stage: str) -> tuple[str, ...]:
-    """Lists the sections that a stage does not depend on.
-
-    A design that is kept from snapping is confirmed at the loads that its response shows.
-    """
-    confirmed = stage in ("design", "redesign") and problem.objective.snap == "avoid"
+    """Lists the sections that a stage does not depend on."""
+    passes = _passes_what_is_shown(problem, stage)
     listed = STAGES[stage].unused or ()
-    return tuple(name for name in listed if not (confirmed and name == "response"))
+    return tuple(name for name in listed if not (passes and name == "response"))
+
+
+def _passes_what_is_shown(problem: Problem, stage: str) -> bool:
+    """Tells whether a stage passes the loads, or the instants, that the response shows.
+
+    A design under slow loads is confirmed by a path through them, unless its loads are in ranges.
+    """
+    if stage == "verify":
+        return not problem.static
+    slow = problem.static and problem.objective.loads is None
+    return slow and stage in ("design", "redesign")
 
 
 def _keep_switches(data: dict[str, Any]) -> None:

@@ -203,6 +203,7 @@ def test_a_measured_motion_is_read_in_the_units_of_its_heading(fig2: Path, tmp_p
 OWN = {
     "simulate": {"response"},
     "as_built": {"response", "fabrication"},
+    "verify": {"response"},
     "virtual_specimen": {"response"},
     "sweep": {"sweep"},
     "monte_carlo": {"robustness"},
@@ -236,18 +237,23 @@ def read_to_pose() -> set[str]:
     return read
 
 
-@pytest.mark.parametrize(("snap", "alike"), [("allow", True), ("avoid", False)])
-def test_a_design_kept_from_snapping_depends_on_the_loads_that_are_shown(
-    snap: str, alike: bool, tmp_path: Path
+RANGES = ", loads: { directions: [90 deg, 270 deg] }"
+
+
+@pytest.mark.parametrize(("more", "alike"), [("", False), (", snap: avoid", False), (RANGES, True)])
+def test_a_design_depends_on_the_loads_that_are_shown_where_they_confirm_it(
+    more: str, alike: bool, tmp_path: Path
 ) -> None:
-    """At these it is confirmed."""
+    """The check by finer steps replaces them."""
     path = static.write(tmp_path, static.HOLE, size=5)
-    text = path.read_text().replace("target: intact", f"target: intact, snap: {snap}")
+    text = path.read_text().replace("target: intact", f"target: intact{more}")
     hashes = []
     for samples in (9, 21):
         path.write_text(text.replace("samples: 9", f"samples: {samples}"))
-        hashes.append([section_hash(load(path), name) for name in ("design", "redesign")])
-    assert (hashes[0] == hashes[1]) is alike
+        stages = ("design", "redesign", "verify")
+        hashes.append([section_hash(load(path), name) for name in stages])
+    same = [one == other for one, other in zip(*hashes, strict=True)]
+    assert same == [alike, alike, True]
 
 
 def others(section: BaseModel, path: str = "") -> Iterator[tuple[str, BaseModel]]:
