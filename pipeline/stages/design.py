@@ -46,6 +46,9 @@ from sim.structure import overlapping_pairs, shape, smallest_gap
 
 LOG = logging.getLogger(__name__)
 
+NO_DESIGN = (InfeasibleStartError, SimulationError)
+"""Why a descent may end without a design, while others go on."""
+
 
 def work(args: argparse.Namespace) -> None:
     """Reads the problem, optimises, writes the design.
@@ -62,15 +65,40 @@ def work(args: argparse.Namespace) -> None:
     scene = design_scene(asked, args.problem.parent)
     start = start_vector(asked, scene, args.start, args.problem)
     plan = _plan(scene, args)
-    results = [
-        _descend(posed, scene, plan, _kicked(start, number, posed, scene), args)
-        for number, posed in enumerate(_seeded(asked, args.method))
-    ]
-    made = design_dataset(asked, scene, min(results, key=lambda each: (each.violation, each.loss)))
+    results = _descents(asked, scene, plan, start, args)
+    ended = [each for each in results if each is not None]
+    made = design_dataset(asked, scene, min(ended, key=lambda each: (each.violation, each.loss)))
     parents = {} if args.start is None else {"start": args.start}
-    found = plan.record() | {"descents": [each.loss for each in results]}
+    losses = [None if each is None else each.loss for each in results]
+    found = plan.record() | {"descents": losses}
     origin = provenance.of_study(asked, "design", method=args.method, parents=parents, plan=found)
     datasets.write(made, args.out, "design_method", origin)
+
+
+def _descents(
+    asked: Problem, scene: Scene, plan: Plan, start: Floats | None, args: argparse.Namespace
+) -> list[Result | None]:
+    """Optimises with every seed; None stands for a descent that ends without a design.
+
+    Raises:
+        UserError: why the first does, where all do.
+    """
+    found: list[Result | None] = []
+    first: UserError | None = None
+    for number, posed in enumerate(every := _seeded(asked, args.method)):
+        kicked = _kicked(start, number, posed, scene)
+        try:
+            found.append(_descend(posed, scene, plan, kicked, args))
+        except UserError as error:
+            if len(every) == 1 or not isinstance(error.__cause__, NO_DESIGN):
+                raise
+            place = number + 1, len(every)
+            LOG.warning("descent %d of %d ends without a design: %s", *place, error.what)
+            found.append(None)
+            first = first or error
+    if first is not None and not any(found):
+        raise first
+    return found
 
 
 def _seeded(asked: Problem, method: str) -> list[Problem]:
@@ -171,7 +199,8 @@ def optimise(
         except UnconfirmedError as error:
             raise failures.unconfirmed(error, asked, source) from error
         except SimulationError as error:
-            stopped = failures.StoppedError(error, scene, "initial", plan.solver.output_times)
+            name = "initial" if start is None else "starting"
+            stopped = failures.StoppedError(error, scene, name, plan.solver.output_times)
             raise stopped.explain(source) from error
         except JournalInUseError as error:
             raise UserError(str(error), file=source) from error

@@ -35,10 +35,13 @@ def history_facts(problem: Problem, design: xr.Dataset) -> Iterator[Fact]:
         violation = float(history["violation"].isel(evaluation=at))
         yield _told("violation_{method}", violation, **of)
         yield _told("kkt_{method}", float(history["kkt_residual"]), **of)
-    losses = json.loads(design.attrs["plan"]).get("descents", [])
-    if len(losses) > 1:
+    descents = json.loads(design.attrs["plan"]).get("descents", [])
+    if len(descents) > 1:
+        losses = [each for each in descents if each is not None]
         words = f"{worded(min(losses), unit, 3)} to {worded(max(losses), unit, 3)}"
-        yield _told("descents", max(losses) / min(losses), words, count=len(losses))
+        if without := len(descents) - len(losses):
+            words += f"; {without} without a design"
+        yield _told("descents", max(losses) / min(losses), words, count=len(descents))
 
 
 def error_facts(response: xr.Dataset, note: str) -> Iterator[Fact]:
