@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from itertools import groupby
-from operator import itemgetter
+from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,6 +17,7 @@ from pipeline.problem.outlines.plane import Outline, extents
 from pipeline.runtime import UserError, read_bounded
 
 if TYPE_CHECKING:
+    from shapely import Geometry
     from svgelements import Path as SvgPath
 
 DARK, LIGHT = 77, 178
@@ -47,7 +48,8 @@ def read_outlines(
 
     A point within an odd number of them lies in the shape. A pixel is in it below the `threshold`,
     a grey level from 0 of black to 1 of white; without it, an image must be binary. So is a part of
-    a drawing, whose light parts cut those they lie on. `invert` takes what is light.
+    a drawing, whose light parts cut those they lie on; fills that overlap are one, and a fill that
+    crosses or holds its own outline has holes. `invert` takes what is light.
 
     Raises:
         UserError: no such file, unreadable, not binary, or without a shape.
@@ -146,7 +148,12 @@ def _of_drawing(path: Path, threshold: float | None, invert: bool) -> list[NDArr
     except (OSError, ValueError, SyntaxError, ArithmeticError, RecursionError) as error:
         raise UserError(f"not a readable SVG: {error}", remedy="save it as plain SVG") from error
     level = LIGHT if threshold is None else 255 * threshold
-    return _painted([((_grey(each) < level) != invert) for each in paths], drawn)
+    shown = [(_grey(each) < level) != invert for each in paths]
+    return _painted([*map(_Painted, shown, map(_is_filled, paths), drawn)])
+
+
+def _is_filled(path: SvgPath) -> bool:
+    return path.fill is not None and path.fill.value is not None
 
 
 def _grey(path: SvgPath) -> float:
@@ -157,21 +164,49 @@ def _grey(path: SvgPath) -> float:
     return 0.0
 
 
-def _painted(shown: list[bool], drawn: list[list[NDArray[Any]]]) -> list[NDArray[Any]]:
-    """Lists outlines of what is shown by the pieces of paths, each painted over those before it."""
-    if all(shown):
-        return [points for pieces in drawn for points in pieces]
+class _Painted(NamedTuple):
+    """Holds the outlines of a path, and how they are painted."""
+
+    in_shape: bool
+    filled: bool
+    pieces: list[NDArray[Any]]
+
+
+def _painted(paths: list[_Painted]) -> list[NDArray[Any]]:
+    """Lists outlines of what is in the shape, each path being painted over those before it."""
     import shapely
 
+    if _apart(paths):
+        return [points for each in paths for points in each.pieces]
     shape = shapely.Polygon()
-    layers = groupby(zip(shown, drawn, strict=True), key=itemgetter(0))
-    for in_shape, layer in layers:
-        rings = [shapely.Polygon(points) for _, pieces in layer for points in pieces]
-        area = shapely.make_valid(shapely.MultiPolygon(rings))  # what an odd number of them cover
+    for in_shape, layer in groupby(paths, key=attrgetter("in_shape")):
+        area = shapely.union_all(_areas([*layer]))
         shape = shape | area if in_shape else shape - area
     parts = [part for part in shapely.get_parts(shape) if part.area > 0.0]
     rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
     return [np.array(ring.coords)[:-1] for ring in rings]
+
+
+def _apart(paths: list[_Painted]) -> bool:
+    """Tells paths that are all in the shape and overlap nowhere, so that it has their outlines."""
+    import shapely
+
+    if not all(each.in_shape for each in paths):
+        return False
+    areas = _areas(paths)
+    return sum(area.area for area in areas) <= (1.0 + 1e-9) * shapely.union_all(areas).area
+
+
+def _areas(paths: list[_Painted]) -> list[Geometry]:
+    """Lists the areas of fills, and the one that an odd number of lines without a fill encloses."""
+    import shapely
+
+    fills = [each.pieces for each in paths if each.filled]
+    lines = [points for each in paths if not each.filled for points in each.pieces]
+    return [
+        shapely.make_valid(shapely.MultiPolygon([shapely.Polygon(points) for points in pieces]))
+        for pieces in (*fills, lines)
+    ]
 
 
 def _parsed(path: Path) -> tuple[list[Any], list[SvgPath]]:
@@ -194,9 +229,8 @@ def _check_outlines(elements: list[Any], paths: list[SvgPath]) -> None:
         remedy = "convert text to paths (Inkscape: Path > Object to Path)"
         raise UserError("the drawing holds text, which has no outline", remedy=remedy)
     for path in paths:
-        filled = path.fill is not None and path.fill.value is not None
         pieces = [piece for piece in path.as_subpaths() if len(piece) > 1]
-        if not filled and any(
+        if not _is_filled(path) and any(
             not isinstance(piece[-1], Close) and piece[0].end != piece[-1].end for piece in pieces
         ):
             remedy = "close them, or convert strokes to paths (Inkscape: Path > Stroke to Path)"

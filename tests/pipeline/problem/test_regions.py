@@ -102,6 +102,15 @@ def test_text_and_open_strokes_are_to_be_converted(drawn: str, what: str, tmp_pa
         read_outlines(path)
 
 
+@cases("problem", "drawn, inside")
+def test_fills_that_overlap_are_one(drawn: str, inside: list[bool], tmp_path: Path) -> None:
+    """At the middle, beside it, and in a corner."""
+    path = tmp_path / "l.svg"
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{drawn}</svg>')
+    points = [(20.0, -20.0), (7.0, -20.0), (2.0, -2.0)]
+    assert find_inside(points, read_outlines(path), 1e-9) == inside
+
+
 GROUND = '<rect width="100" height="100" fill="{}"/>'
 LETTER = '<path fill="{}" d="M30 20 h15 v45 h25 v15 h-40 z"/>'
 
