@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
@@ -98,12 +98,23 @@ def _of_csv(path: Path) -> NetworkContent:
             raise UserError(
                 f"ligament {ligament:g} has {len(ends)} ends", remedy="give it two rows"
             )
+    _check_numbers(units)
     listed = sorted(ligaments.items())
     return NetworkContent(
         tuple(tuple(corners) for _, corners in sorted(units.items())),
         tuple((first, second) for _, (first, second) in listed),
         tuple(_stiffness(stiffnesses.get(number, {})) for number, _ in listed) if more else None,
     )
+
+
+def _check_numbers(units: Collection[float]) -> None:
+    """Refuses numbers by which units would not be found again: they count from 0, without gaps."""
+    for wanted, number in enumerate(sorted(units)):
+        if number != wanted:
+            what = f"{len(units)} units are numbered from 0 on, and the list has {number:g}"
+            what += f" where {wanted} is wanted"
+            remedy = "number them without gaps: supports and drives list them as [number, 0]"
+            raise UserError(what, remedy=remedy)
 
 
 def _stiffness(given: dict[str, float]) -> Stiffness:
@@ -134,7 +145,11 @@ def _of_netcdf(path: Path) -> NetworkContent:
 
 
 def _of_dxf(path: Path) -> NetworkContent:
-    """Reads closed polylines as units, lines as ligaments, whatever their layers; to mm."""
+    """Reads closed polylines as units, lines as ligaments, whatever their layers; to mm.
+
+    Raises:
+        UserError: unreadable, or an outline with arcs.
+    """
     from ezdxf import recover
     from ezdxf.entities.lwpolyline import LWPolyline
     from ezdxf.entities.polyline import Polyline
@@ -152,27 +167,36 @@ def _of_dxf(path: Path) -> NetworkContent:
     unitless = unit == InsertUnits.Unitless
     scale = 1.0 if unitless else conversion_factor(unit, InsertUnits.Millimeters)
     space = drawing.modelspace()
-    polygons = tuple(
-        tuple(_point((scale * x, scale * y)) for x, y in _corners(line))
+    outlines = (
+        _outline(line, scale)
         for line in space.query("LWPOLYLINE POLYLINE")
-        if isinstance(line, LWPolyline | Polyline) and line.is_closed
+        if isinstance(line, LWPolyline | Polyline)
     )
     ligaments = tuple(
         (_scaled(line.dxf.start, scale), _scaled(line.dxf.end, scale))
         for line in space.query("LINE")
     )
-    return NetworkContent(polygons, ligaments)
+    return NetworkContent(tuple(filter(None, outlines)), ligaments)
 
 
-def _corners(line: LWPolyline | Polyline) -> list[tuple[float, float]]:
-    """Lists corners of a polyline, the first not repeated at its end."""
+def _outline(line: LWPolyline | Polyline, scale: float) -> tuple[Point, ...]:
+    """Lists corners of a polyline, mm, that is closed or ends where it began; none of another.
+
+    Raises:
+        UserError: it has arcs.
+    """
     from ezdxf.entities.lwpolyline import LWPolyline
 
-    if isinstance(line, LWPolyline):
-        points = [(x, y) for x, y in line.vertices()]
-    else:
-        points = [(place.x, place.y) for place in line.points()]
-    return points[:-1] if len(points) > 1 and points[0] == points[-1] else points
+    places = line.vertices() if isinstance(line, LWPolyline) else line.points()
+    corners = tuple(_point((scale * place[0], scale * place[1])) for place in places)
+    returns = len(corners) > 1 and corners[0] == corners[-1]
+    if not (line.is_closed or returns):
+        return ()
+    if line.has_arc:
+        x, y = corners[0]
+        remedy = "draw its rounded sides by straight pieces"
+        raise UserError(f"the outline from ({x:g}, {y:g}) mm on has arcs", remedy=remedy)
+    return corners[:-1] if returns else corners
 
 
 def _scaled(place: Vec3, scale: float) -> Point:

@@ -262,7 +262,8 @@ class Kagome(_WithNetwork, _Grid):
 class ListedNetwork(_WithNetwork):
     """Polygons and ligaments from a file: CSV, netCDF, or closed polylines and lines of a DXF.
 
-    Units are numbered in the order of the file and listed as [number, 0].
+    Units are listed as [number, 0]: by their numbers in a CSV, which count from 0 without gaps, and
+    by the order in other files. Polylines that end where they begin are closed; none has arcs.
 
     Attributes:
         kind: which of the lattices this is.

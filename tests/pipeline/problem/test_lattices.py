@@ -47,13 +47,16 @@ def as_netcdf(path: Path, lattice: Lattice) -> None:
 
 
 def as_dxf(path: Path, lattice: Lattice) -> None:
-    """Draws as by hand: in cm, some units clockwise or closed twice, ligaments not quite met."""
+    """Draws as by hand: in cm, some units clockwise, some closed by their last corner or twice.
+
+    Ligaments do not quite meet them.
+    """
     drawing = new(units=InsertUnits.Centimeters)
     space = drawing.modelspace()
     for unit in range(lattice.n_units):
         ring = lattice.vertices[lattice.unit == unit] / 10
         corners = ring[:: -1 if unit % 3 else 1].tolist()
-        space.add_lwpolyline(corners + corners[:1] * (unit % 2), close=True)
+        space.add_lwpolyline(corners + corners[:1] * (unit % 2), close=unit % 4 < 3)
     for start, end in (lattice.vertices[lattice.ligaments] / 10 + 0.01).tolist():
         space.add_line(start, end)
     drawing.saveas(path)
@@ -100,6 +103,16 @@ def test_a_drawing_runs_as_the_lattice_that_it_shows(tmp_path: Path) -> None:
     altered, cloaked = drawn["loss"].values[1:, 0]
     assert altered == pytest.approx(0.1714, abs=1e-4)
     assert cloaked < 0.9 * altered
+
+
+def test_outlines_with_arcs_are_told(tmp_path: Path) -> None:
+    drawing = new(units=InsertUnits.Millimeters)
+    corners = [(0.0, 0.0), (9.0, 0.0, 0.0, 0.0, 0.4), (9.0, 9.0), (0.0, 9.0)]
+    drawing.modelspace().add_lwpolyline(corners, close=True)
+    drawing.modelspace().add_line((0.0, 0.0), (1.0, 1.0))
+    drawing.saveas(tmp_path / "x.dxf")
+    with refused("the outline from (0, 0) mm on has arcs", "lattice.file", remedy="straight"):
+        load(from_file(tmp_path, "x.dxf"))
 
 
 KAGOME = """  kind: kagome
