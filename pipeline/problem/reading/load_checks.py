@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from math import atan2, hypot, isclose
 
 from pipeline.problem import Problem
 from pipeline.problem.reading.fault import Findings, ProblemFault
@@ -19,6 +20,9 @@ from pipeline.problem.sections import (
     selected_units,
     single_drives,
 )
+
+_ALIKE = 1e-6
+"""Relative difference up to which a value is the drive's: that of a mixture has no end."""
 
 
 def selectors_of(problem: Problem) -> Iterator[tuple[KeyPath, Selector]]:
@@ -177,39 +181,52 @@ def _turned(problem: Problem, ranges: LoadRanges | TestSetup) -> Problem:
     return problem.model_copy(update={"drive": drive})
 
 
-def _single_values(
-    problem: Problem, drive: DisplacementDrive, ranges: LoadRanges | TestSetup, place: KeyPath
-) -> Findings:
-    """Finds ranges of one value that the drive does not have: its own loads are of the family."""
-    own = {
-        "directions": drive.directions,
-        "amplitude": (getattr(drive, "amplitude", None),),
-        "frequency": (problem.frequency,),
-    }
-    for name, values in own.items():
-        low, high = getattr(ranges, name) or (0.0, 1.0)
-        if low == high and any(value is not None and value != low for value in values):
-            what = "one value, which is not the drive's"
-            yield ProblemFault(what, (*place, name), "give the drive's, or a range that has it")
-
-
 def _ranges(problem: Problem, ranges: LoadRanges | TestSetup, place: KeyPath) -> Findings:
     """Finds ranges that the drive of a set-up does not have."""
     drive = problem.drive
-    if isinstance(drive, SeveralDrives):
-        parts = drive.drives
-        ramps = all(isinstance(part, LinearRampDrive | TanhRampDrive) for part in parts)
-        if len(parts) != 2 or not ramps or len(drive.case_weights) > 1:
-            what = "loads in ranges are mixtures of two slow displacements"
-            yield ProblemFault(what, place, "give two ramps, of one direction each")
-    elif not isinstance(drive, DisplacementDrive):
+    if isinstance(drive, SeveralDrives) and not _are_two_ramps(drive):
+        what = "loads in ranges are mixtures of two slow displacements"
+        yield ProblemFault(what, place, "give two ramps, of one direction each")
+    elif not isinstance(drive, SeveralDrives | DisplacementDrive):
         what = f"a drive of the kind {drive.kind} has no displacement and direction to vary"
         yield ProblemFault(what, place, "leave it out, or displace units along a direction")
     elif ranges.frequency is not None and problem.frequency is None:
-        what = f"a {drive.kind} drive has no frequency to vary"
-        yield ProblemFault(what, (*place, "frequency"), "leave it out")
+        of = "two ramps have" if drive.kind == "several" else f"a {drive.kind} drive has"
+        yield ProblemFault(f"{of} no frequency to vary", (*place, "frequency"), "leave it out")
     elif ranges.frequency is not None and problem.horizon.periods is None:
         what = "a time does not fit loads of all frequencies"
         yield ProblemFault(what, ("horizon", "duration"), "give `periods`")
     else:
-        yield from _single_values(problem, drive, ranges, place)
+        yield from _single_values(_own_loads(problem, drive), ranges, place)
+
+
+def _are_two_ramps(drive: SeveralDrives) -> bool:
+    ramps = [isinstance(part, LinearRampDrive | TanhRampDrive) for part in drive.drives]
+    return ramps == [True, True] and len(drive.case_weights) == 1
+
+
+def _own_loads(
+    problem: Problem, drive: SeveralDrives | DisplacementDrive
+) -> dict[str, tuple[float, ...]]:
+    """Lists directions (rad), amplitudes (mm) and frequencies (Hz) of the drive's own loads.
+
+    Those of two drives are of their mixture.
+    """
+    frequency = () if problem.frequency is None else (problem.frequency,)
+    if isinstance(drive, DisplacementDrive):
+        own = {"directions": drive.directions, "amplitude": (drive.amplitude,)}
+        return own | {"frequency": frequency}
+    first, second = (getattr(part, "amplitude", 0.0) for part in drive.drives)
+    mixed = {"directions": (atan2(second, first),), "amplitude": (hypot(first, second),)}
+    return mixed | {"frequency": frequency}
+
+
+def _single_values(
+    own: dict[str, tuple[float, ...]], ranges: LoadRanges | TestSetup, place: KeyPath
+) -> Findings:
+    """Finds ranges of one value that the drive does not have: its own loads are of the family."""
+    for name, values in own.items():
+        low, high = getattr(ranges, name) or (0.0, 1.0)
+        if low == high and not all(isclose(value, low, rel_tol=_ALIKE) for value in values):
+            what = "one value, which is not the drive's"
+            yield ProblemFault(what, (*place, name), "give the drive's, or a range that has it")

@@ -1,8 +1,8 @@
 """Describes sections that no design depends on: robustness and report."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pipeline.problem.fields import (
     Coordinate,
@@ -15,6 +15,7 @@ from pipeline.problem.fields import (
     Ratio,
     Samples,
     Section,
+    fault,
 )
 
 
@@ -50,6 +51,13 @@ class Robustness(Section):
     stiffness: tuple[Ratio, ...] = (0.1,)
     together: WorkshopTolerance | None = WorkshopTolerance()
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
+
+    @model_validator(mode="after")
+    def _asks_for_copies(self) -> Self:
+        if not self.geometry and not self.stiffness and self.together is None:
+            remedy = "give a size, or leave the section out (a preset: `robustness: null`)"
+            raise fault("no copies are asked for", remedy, "together")
+        return self
 
 
 class MeasuredConstants(Section):

@@ -158,6 +158,28 @@ def test_bad_ranges(fig2: Path, tmp_path: Path, changes: dict[str, object], key:
         load(write(fig2, tmp_path, **changes))
 
 
+TWO = """drives:
+  - { kind: linear_ramp, units: top, amplitude: 3 mm, duration: 1 s, direction: 270 deg }
+  - { kind: linear_ramp, units: { units: [[4, 1], [4, 2]] }, amplitude: 4 mm, duration: 1 s,
+      direction: 180 deg }
+"""
+
+
+@cases("stages", "ranges, key, what")
+def test_ranges_of_two_drives(tmp_path: Path, ranges: str, key: str | None, what: str) -> None:
+    path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
+    before, _, after = path.read_text().partition("drive:\n")
+    rest = after[after.index("horizon:") :]
+    loads = f"target: intact, loads: {{ {ranges} }}"
+    text = before + TWO + rest.replace("target: intact", loads)
+    path.write_text(text.replace("units: left", "units: bottom"))
+    if key is None:
+        assert load(path).objective.loads is not None
+        return
+    with refused(what, key):
+        load(path)
+
+
 def test_ranges_left_out_are_the_drives_own(fig2: Path) -> None:
     own = load(fig2, "unbiased").objective.loads
     assert own is not None
