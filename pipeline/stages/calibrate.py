@@ -11,7 +11,7 @@ from pipeline.calibration import (
     fit_calibration,
     simulation_fault,
 )
-from pipeline.calibration.inputs import Calibration, source_files
+from pipeline.calibration.inputs import Calibration, has_synthetic, source_files
 from pipeline.datasets import provenance
 from pipeline.problem.reading import load_section
 from pipeline.runtime import UserError, sidecar_path, write_atomically
@@ -48,13 +48,12 @@ def _fit(path: Path, args: argparse.Namespace) -> None:
     for line in filter(None, made.attrs["warnings"].split("\n")):
         LOG.warning("%s", line)
     parents = source_files(asked, path.parent)
+    synthetic = asked.synthetic or has_synthetic(asked.data, path.parent)
     origin = provenance.of_recording(
-        asked.model_dump_json(), parents, synthetic=asked.synthetic, role="calibration"
+        asked.model_dump_json(), parents, synthetic=synthetic, role="calibration"
     )
     datasets.write(made, args.out, "calibration", origin)
-    words = calibration_dataset.material_fragment(
-        fit, found, asked.title, synthetic=asked.synthetic
-    )
+    words = calibration_dataset.material_fragment(fit, found, asked.title, synthetic=synthetic)
     with write_atomically(fragment) as aside:
         aside.write_text(words, encoding="utf-8")
     LOG.info("%s", words.rstrip())

@@ -6,7 +6,14 @@ from pathlib import Path
 
 from pipeline import datasets
 from pipeline.calibration import simulation_fault, study_cycles, study_pictures
-from pipeline.calibration.inputs import ELASTIC_NAMES, UNITS, KnownPictures, LoadCycles, Population
+from pipeline.calibration.inputs import (
+    ELASTIC_NAMES,
+    UNITS,
+    KnownPictures,
+    LoadCycles,
+    Population,
+    has_synthetic,
+)
 from pipeline.calibration.population import BEYOND, draw_constants, validate_population
 from pipeline.datasets import provenance
 from pipeline.problem.fields import Section, named_files
@@ -39,9 +46,7 @@ def work(args: argparse.Namespace) -> None:
 def _samples(args: argparse.Namespace) -> None:
     asked, folder = load_section(args.file, Population), args.file.parent
     made = validate_population(asked, folder)
-    read = (folder / each.file for each in (*asked.data, asked.predict))
-    tracks = [path for path in read if path.suffix == ".nc"]
-    synthetic = any(datasets.read(path, "track").attrs["synthetic"] == "yes" for path in tracks)
+    synthetic = has_synthetic((*asked.data, asked.predict), folder)
     origin = _origin(asked, folder, "population", synthetic=synthetic)
     datasets.write(made, args.out, "population", origin)
     for name, what in _DRAWN.items():
@@ -63,8 +68,9 @@ def _constants(args: argparse.Namespace) -> None:
     asked = load_section(args.file, Population)
     drawn = draw_constants(asked, args.file.parent, args.count)
     files = {args.file.name: args.file, **named_files(asked, args.file.parent)}
-    source = asked.source
+    source, synthetic = asked.source, has_synthetic(asked.data, args.file.parent)
     lines = [
+        *(["# SYNTHETIC: found from computed data, not from specimens"] if synthetic else []),
         f"# Constants of new samples, drawn from what {args.file.name} finds of those measured",
         f"# Measured by {source.by}. {source.reference}",
         f"# Licence: {source.licence}. Made by python -m pipeline validate constants",

@@ -19,6 +19,7 @@ from .known_pictures import RigidParts as RigidParts
 from .known_pictures import SpecimenPicture as SpecimenPicture
 from .load_cycles import CycleRecord as CycleRecord
 from .load_cycles import LoadCycles as LoadCycles
+from .measured_sources import has_synthetic as has_synthetic
 from .measured_sources import source_files as source_files
 from .population import MeasurementSource as MeasurementSource
 from .population import Population as Population

@@ -1,9 +1,11 @@
-"""Lists the files that a calibration is made from."""
+"""Lists the files that a calibration is made from, and tells whether any is of computed data."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
-from pipeline import problem
-from pipeline.calibration.inputs.description import Calibration, TrackedMotion
+from pipeline import datasets, problem
+from pipeline.calibration.inputs.description import Calibration, MeasurementSet, TrackedMotion
+from pipeline.calibration.inputs.population import SampleTest
 from pipeline.problem.fields import named_files
 
 
@@ -26,3 +28,17 @@ def source_files(asked: Calibration, folder: Path) -> dict[str, Path]:
                 if not key.startswith("report.")  # of pages alone
             }
     return found
+
+
+def has_synthetic(sets: Iterable[MeasurementSet | SampleTest], folder: Path) -> bool:
+    """Tells whether any set in a folder is a track that was rendered or computed, not filmed.
+
+    Raises:
+        UserError: a track cannot be read.
+    """
+    tracks = [
+        folder / each.file
+        for each in sets
+        if each.file is not None and (isinstance(each, TrackedMotion) or each.file.endswith(".nc"))
+    ]
+    return any(datasets.read_attributes(path).get("synthetic") == "yes" for path in tracks)
