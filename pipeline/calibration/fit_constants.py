@@ -77,7 +77,7 @@ def read_experiment(asked: MeasurementSet, begin: Constants, path: Path) -> Expe
     folder = path.parent
     if isinstance(asked, ForceDisplacement):
         return force_displacement.pose_force_test(
-            asked, begin, *force_displacement.read(asked, folder)
+            asked, begin, *force_displacement.read(asked, folder, tare=asked.tare)
         )
     if isinstance(asked, FreeDecay):
         return free_decay.pose_decay(asked, *free_decay.read(asked, folder))

@@ -49,8 +49,13 @@ class ForceFile(Protocol):
     def record(self) -> RecordOptions | None: ...  # noqa: D102
 
 
-def read(asked: ForceFile, folder: Path) -> tuple[Floats, Floats]:
+def read(asked: ForceFile, folder: Path, *, tare: bool = False) -> tuple[Floats, Floats]:
     """Reads displacements in mm and forces in N from the file of a set.
+
+    Args:
+        asked: the set.
+        folder: from which its file is named.
+        tare: whether the load cell's zero is unknown, as the least displacement tells it then.
 
     Raises:
         UserError: the file cannot be used.
@@ -68,6 +73,12 @@ def read(asked: ForceFile, folder: Path) -> tuple[Floats, Floats]:
         except ValueError as error:
             remedy = "look at the curve, and change branch, drop_first or toe"
             raise UserError(str(error), file=path, key="record", remedy=remedy) from error
+    _check_signs(asked, path, displacement, force - tare * force[np.abs(displacement).argmin()])
+    return displacement, force
+
+
+def _check_signs(asked: ForceFile, path: Path, displacement: Floats, force: Floats) -> None:
+    """Refuses a displacement or a force that counts against the test."""
     if not (displacement > 0).any() and (asked.test != "shear" or not displacement.any()):
         raise UserError(
             "the displacement is nowhere above zero",
@@ -76,7 +87,16 @@ def read(asked: ForceFile, folder: Path) -> tuple[Floats, Floats]:
             value=f"down to {displacement.min():g} mm",
             remedy=f"count it positive in {asked.test}, or write record: {{reversed: both}}",
         )
-    return displacement, force
+    if force @ displacement <= 0.0:
+        far = np.abs(displacement).argmax()
+        raise UserError(
+            "the force is on the whole not above zero along the displacement",
+            file=path,
+            key=asked.columns.force,
+            value=f"{force[far]:g} N at {displacement[far]:g} mm",
+            remedy="count it positive along the displacement, or write record: {reversed: force};"
+            " zero: start takes out an offset of the load cell",
+        )
 
 
 def _read_track(path: Path, test: TestKind) -> tuple[Floats, Floats]:

@@ -46,7 +46,8 @@ class RecordOptions(Section):
 
     Attributes:
         branch: of each cycle that is taken.
-        reversed: what the machine counts the other way than the test's direction.
+        reversed: what the machine counts the other way than the test's direction; of a track the
+            force alone can be.
         drop_first: leaves out the first cycle.
         zero: of displacement and force: as they are, or where each branch starts.
         toe: force by which the slack is taken up; the displacement then counts from where the line
@@ -58,6 +59,15 @@ class RecordOptions(Section):
     drop_first: bool = False
     zero: Literal["file", "start"] = "file"
     toe: Force | None = None
+
+
+def check_reversed(file: str | None, record: RecordOptions | None) -> None:
+    """Refuses to turn the displacement of a track, which counts in the test's direction."""
+    turned = record is not None and record.reversed in ("displacement", "both")
+    if turned and file is not None and file.endswith(".nc"):
+        what = "a track's displacement counts in the test's direction"
+        remedy = "write reversed: force, if the load cell counts the other way, or leave it out"
+        raise fault(what, remedy, "record.reversed")
 
 
 class ForceDisplacement(Section):
@@ -90,6 +100,7 @@ class ForceDisplacement(Section):
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         exactly_one(self, "file", "virtual")
+        check_reversed(self.file, self.record)
         return self
 
 

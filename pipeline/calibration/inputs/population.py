@@ -9,6 +9,7 @@ from pipeline.calibration.inputs.description import (
     Label,
     RecordOptions,
     TestKind,
+    check_reversed,
 )
 from pipeline.problem.fields import Count, File, Length, Positive, Samples, Section, fault
 from pipeline.problem.sections import Lattice, MaterialConstants
@@ -50,6 +51,11 @@ class SampleTest(Section):
     file: File
     columns: ForceColumns = ForceColumns()
     record: RecordOptions | None = None
+
+    @model_validator(mode="after")
+    def _in_direction(self) -> Self:
+        check_reversed(self.file, self.record)
+        return self
 
     @property
     def name(self) -> str:

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
+from pydantic import ValidationError
 
 from pipeline import datasets
 from pipeline.calibration import load_cycle_study, study_cycles
 from pipeline.calibration.experiments import force_displacement, load_cycles
-from pipeline.calibration.inputs import ForceDisplacement, LoadCycles, RecordOptions
+from pipeline.calibration.inputs import ForceDisplacement, LoadCycles, RecordOptions, SampleTest
 from pipeline.calibration.load_cycle_study import follow_cycle, measure_cycle
 from pipeline.problem.fields import csv_columns
 from pipeline.problem.reading import load_section, overlay_keys
@@ -127,6 +128,38 @@ def test_a_test_in_the_other_direction_is_refused(tmp_path: Path) -> None:
     record = {"record": {"reversed": "both"}}
     way, force = force_displacement.read(asked_of("one.csv", **record), tmp_path)
     np.testing.assert_array_equal([way, force], [np.arange(20), 2 * np.arange(20)])
+
+
+@pytest.mark.parametrize("tare", [False, True])
+def test_a_force_against_the_test_is_refused(tare: bool, tmp_path: Path) -> None:
+    lines = "\n".join(f"{k},{tare * 90 - 2 * k}" for k in range(20))
+    (tmp_path / "one.csv").write_text(f"displacement (mm),force (N)\n{lines}\n")
+    with refused("not above zero", "force", "reversed: force", file=tmp_path / "one.csv"):
+        force_displacement.read(asked_of("one.csv"), tmp_path, tare=tare)
+    turned = asked_of("one.csv", record={"reversed": "force"})
+    _, force = force_displacement.read(turned, tmp_path, tare=tare)
+    assert force[-1] > force[0]
+
+
+def test_an_offset_of_the_load_cell_is_no_force_against_the_test(tmp_path: Path) -> None:
+    lines = "\n".join(f"{k},{2 * k - 90}" for k in range(20))
+    (tmp_path / "one.csv").write_text(f"displacement (mm),force (N)\n{lines}\n")
+    _, force = force_displacement.read(asked_of("one.csv"), tmp_path, tare=True)
+    np.testing.assert_array_equal(force, 2 * np.arange(20) - 90)
+    with refused("not above zero", "force", "zero: start"):
+        force_displacement.read(asked_of("one.csv"), tmp_path)
+
+
+@pytest.mark.parametrize("turned", ["displacement", "both"])
+def test_the_displacement_of_a_track_is_not_turned(turned: str) -> None:
+    with pytest.raises(ValidationError, match="counts in the test's direction"):
+        asked_of("run.nc", record={"reversed": turned})
+    with pytest.raises(ValidationError, match="counts in the test's direction"):
+        SampleTest.model_validate(
+            {"test": "shear", "samples": ["s1"], "file": "run.nc", "record": {"reversed": turned}}
+        )
+    asked_of("run.nc", record={"reversed": "force"})
+    asked_of("run.csv", record={"reversed": turned})
 
 
 def test_a_track_with_a_load_cell_is_a_test(monkeypatch: pytest.MonkeyPatch) -> None:
