@@ -127,25 +127,28 @@ def track(design: xr.Dataset, seen: DicPoints, subset: float | None = None) -> x
         subset: side of the subsets, mm; by default as neighbours' errors tell.
 
     Raises:
-        UserError: hardly a unit bears points.
+        UserError: hardly a unit bears points enough to tell its motion.
     """
     specimen = outlines_of_design(design)
     unit = _bearer(specimen, seen.place)
-    bearing = len(np.unique(unit[unit >= 0]))
+    time, frame = np.unique(seen.time, return_inverse=True)
+    groups = _grouped(frame * specimen.count + unit, unit >= 0)
+    bearing = len({int(unit[rows[0]]) for rows in groups})
     if bearing < max(3, specimen.count // 10):
         low, high = seen.place.min(axis=0), seen.place.max(axis=0)
         raise UserError(
-            f"{bearing} of {specimen.count} units bear points, which reach from"
-            f" ({low[0]:.1f}, {low[1]:.1f}) to ({high[0]:.1f}, {high[1]:.1f}) mm of the specimen",
+            f"{bearing} of {specimen.count} units bear points enough, {_LEAST} or more at a time;"
+            f" all reach from ({low[0]:.1f}, {low[1]:.1f}) to ({high[0]:.1f}, {high[1]:.1f}) mm"
+            " of the specimen",
             key="origin",
-            remedy="give origin, rotation and flipped so that the points lie on the units",
+            remedy="give origin, rotation and flipped so that the points lie on the units,"
+            f" and export {_LEAST} or more on each",
         )
-    time, frame = np.unique(seen.time, return_inverse=True)
     motion = np.full((len(time), specimen.count, 3), np.nan)
     sigma = np.full_like(motion, np.nan)
     fits = [
         ((frame[rows[0]], unit[rows[0]]), seen.place[rows] - specimen.centre[unit[rows[0]]], rows)
-        for rows in _grouped(frame * specimen.count + unit, unit >= 0)
+        for rows in groups
     ]
     looks, step = [], -(-len(fits) // _MOST_LOOKS)
     for number, (at, before, rows) in enumerate(fits):

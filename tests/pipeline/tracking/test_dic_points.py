@@ -13,12 +13,13 @@ from pipeline.tracking.geometry import outlines_of_design
 from pipeline.tracking.output.dic_points import DicPoints, track
 from tests.pipeline.conftest import Failing
 from tests.pipeline.virtual_lab.conftest import GRID
-from tests.tables import cases
+from tests.tables import cases, refused
 
 SMALL = GRID | {"grid": [4, 4]}
 ORIGIN, ROTATION = np.array([100.0, 40.0]), np.deg2rad(30.0)
 NOISE = 0.002
 REACH = 3.0
+LEAST = 3
 AXES = "origin: [100 mm, 40 mm]\nrotation: 30 deg\nflipped: true\n"
 
 
@@ -73,6 +74,15 @@ def test_points_that_do_not_fit_are_refused(
     path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
     words = ["points", str(path), "--out", str(path.with_name("track.nc"))]
     assert told in failing("track", words)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_points_too_few_to_tell_a_motion_are_refused(count: int) -> None:
+    design, seen = overlapping(1)
+    unit = np.arange(len(seen.time)) // 81
+    few = np.arange(len(unit)) % 81 < np.where(unit % 16 < 15, count, 81)
+    with refused(f"1 of 16 units bear points enough, {LEAST} or more", "origin", f"{LEAST} or"):
+        track(design, DicPoints(*(values[few] for values in seen)))
 
 
 def overlapping(overlap: int, rotation: float = 0.0) -> tuple[xr.Dataset, DicPoints]:
