@@ -14,6 +14,7 @@ from pipeline.runtime import UserError
 from pipeline.tracking.frames import read_frames
 from pipeline.tracking.motion import track_video
 from pipeline.tracking.reference_frame import RecordingSetup
+from pipeline.virtual_lab.filmed_motion import film_clock
 from pipeline.virtual_lab.filming import VirtualFilm, prepare_film, select_case
 from pipeline.virtual_lab.video_writer import encode_video
 from sim.core import Floats, Reals
@@ -147,7 +148,8 @@ def expected_noise(
     if count < LEAST:
         raise UserError("too few frames", key="--frames", value=count, remedy=f"give {LEAST}")
     one = select_case(response, structure, case)
-    film = prepare_film(one, structure, choice.specimen, _clip(choice.setup, count))
+    clip = _clip(choice.setup, one["time"].values, count)
+    film = prepare_film(one, structure, choice.specimen, clip)
     camera = choice.setup.camera
     known = RecordingSetup(choice.setup.look.thickness, camera.distance)
     with TemporaryDirectory() as folder:
@@ -158,20 +160,24 @@ def expected_noise(
     return _compared(film, track.displacement, track.sigma)
 
 
-def _clip(setup: VirtualRecording, count: int) -> VirtualRecording:
-    """Clips the set-up to a few frames at rest and then the motion's beginning."""
+def _clip(setup: VirtualRecording, given: Floats, count: int) -> VirtualRecording:
+    """Clips the set-up to a few frames at rest and then the motion's beginning, at its pace.
+
+    The response has samples at the times `given`, s.
+    """
     resting = min(RESTING, count // 2)
-    length = (count - resting) / setup.rate
-    end = setup.start + length
-    if setup.duration is None:
-        return setup.model_copy(update={"still": resting / setup.rate, "end": end})
-    return setup.model_copy(update={"still": resting / setup.rate, "duration": length})
+    whole = film_clock(given, setup)
+    end = min(whole.start + (count - resting) / setup.rate * whole.pace, whole.end)
+    length = (end - whole.start) / whole.pace
+    shown = {"still": resting / setup.rate, "end": end, "duration": length}
+    return setup.model_copy(update=shown)
 
 
 def _compared(film: VirtualFilm, found: Reals, sigma: Reals) -> ExpectedNoise:
     pixel = film.asked.camera.pixel_size
     scale = np.array([1 / pixel, 1 / pixel, _DEG])
-    error = (found - film.motion.pose[: len(found)]) * scale
+    pose = film.motion.pose[: len(found)]
+    error = (found - (pose - pose[0])) * scale  # a track counts from its first frame
     return ExpectedNoise(
         np.sqrt(np.nanmean(error**2, axis=(0, 1))),
         np.nanmedian(sigma * scale, axis=(0, 1)),
