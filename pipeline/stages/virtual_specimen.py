@@ -20,6 +20,7 @@ from pipeline.posing import (
     unit_coordinates,
 )
 from pipeline.problem import Problem
+from pipeline.problem.sections import ForceDrive, RotationDrive, TorqueDrive, single_drives
 from pipeline.runtime import UserError, found_in
 from pipeline.tracking.frames import Recording
 from pipeline.tracking.frames import recording as recordings
@@ -54,10 +55,22 @@ def dataset(asked: Problem, held: dict[str, PosedStructure], recording: Recordin
     if virtual is None or virtual.specimen is None:
         remedy = "describe the specimen there"
         raise UserError("the recording has no specimen", key="virtual.specimen", remedy=remedy)
+    _check_drive(asked)
     structure = _asked_for(held, recording)
     times = _times(asked, structure.scene, virtual.specimen.unload)
     made = make_specimen(structure, recording.case, virtual.specimen, times[-1])
     return _described(asked, held["altered"].scene, made, recording.case, times)
+
+
+def _check_drive(asked: Problem) -> None:
+    """Refuses drives that a specimen's faults are not of: but one displacement of all units."""
+    drives = single_drives(asked.drive)
+    if len(drives) > 1 or isinstance(drives[0], ForceDrive | TorqueDrive | RotationDrive):
+        what = (
+            f"a specimen is driven by one displacement, the study by drive.kind: {asked.drive.kind}"
+        )
+        remedy = "leave it out, so that the study's own response is filmed"
+        raise UserError(what, key="virtual.specimen", remedy=remedy)
 
 
 def _asked_for(held: dict[str, PosedStructure], recording: Recording) -> PosedStructure:

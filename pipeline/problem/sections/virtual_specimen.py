@@ -39,7 +39,7 @@ class DriveFaults(Section):
 
 
 class SpecimenFaults(Tolerances):
-    """A specimen that is drawn within tolerances, and driven as labs do.
+    """A specimen that is drawn within tolerances, and driven as labs do: by one displacement.
 
     Attributes:
         drive: in what the drive differs from the planned one.

@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from pipeline.virtual_lab.imperfect_specimen import ImperfectDrive, imperfect_dr
 from sim.scene import Scene
 from tests.pipeline import static
 from tests.pipeline.virtual_lab.conftest import SETUP
-from tests.tables import cases
+from tests.tables import cases, refused
 
 NOTHING = dict.fromkeys(("geometry", "ligaments", "stiffness", "units", "damping"), 0.0) | {
     "assembly": {"shift": "0 mm", "turn": "0 deg"}
@@ -105,6 +106,27 @@ def test_a_specimen_that_cannot_be_is_refused(
     held = {"altered": PosedStructure(study[1], study[1].lattice.vertices)}
     with pytest.raises(UserError, match=told):
         virtual_specimen.dataset(study[0], held, Recording.model_validate(recording))
+
+
+AMPLITUDES = {"force": "1 N", "torque": "1 N mm", "rotation": "3 deg"}
+
+
+@pytest.mark.parametrize("kind", [*AMPLITUDES, "several"])
+def test_a_drive_that_the_faults_are_not_of_is_refused(kind: str, tmp_path: Path) -> None:
+    text = yaml.safe_load(static.write(tmp_path, static.HOLE, size=5, amplitude=4.0).read_text())
+    ramp = text.pop("drive")
+    if kind == "several":
+        text["drives"] = [ramp | {"units": {"units": [unit]}} for unit in ([4, 1], [4, 2])]
+    else:
+        directed = {"directions": ["180 deg"]} if kind == "force" else {}
+        text["drive"] = {"kind": kind, "units": "right", "amplitude": AMPLITUDES[kind], **directed}
+    path = tmp_path / "other.yaml"
+    path.write_text(json.dumps(text), encoding="utf-8")
+    asked = problem.load(path)
+    held = {"altered": PosedStructure(scene := scene_of(asked, tmp_path), scene.lattice.vertices)}
+    recording = {"structure": "altered", "virtual": {"specimen": NOTHING}}
+    with refused(f"drive.kind: {kind}", "virtual.specimen"):
+        virtual_specimen.dataset(asked, held, Recording.model_validate(recording))
 
 
 def test_an_assembled_lattice_is_recognised_and_tracked(files: Path, tmp_path: Path) -> None:
