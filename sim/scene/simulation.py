@@ -125,7 +125,8 @@ def simulate(
     Args:
         scene: the scene.
         design: (n_variables,) design vector, mm; by default the initial structure.
-        vertices: (n_vertices, 2) of the structure instead, mm.
+        vertices: (n_vertices, 2) of the structure instead, mm, between which ligaments are those of
+            the lattice; others need a scene of ``dataclasses.replace(lattice, vertices=vertices)``.
         times: (n_times,) of the output, s; by default those of the loss.
         cases: numbers of the load cases; by default all, or those of the ``plan``.
         plan: of `make_plan`, to be made once where many designs are simulated alike.
@@ -140,6 +141,7 @@ def simulate(
     check_cases(scene, chosen)
     if vertices is not None or design is None:
         network = scene.lattice.vertices if vertices is None else vertices
+        check_units(scene.lattice, network)
         values: Parameters[Any] = concrete_parameters(scene, network)
     else:
         values = parameters_of_design(scene)(jnp.asarray(design))

@@ -19,6 +19,8 @@ LOG = logging.getLogger(__name__)
 
 SHORTEST_LIGAMENT = 1e-6
 """Of a ligament at rest, over the spacing: its law divides by its length."""
+ROUNDING = 1e-6
+"""Over the spacing, by which a ligament may differ between given vertices and the lattice."""
 JUMP, SOME_JUMP = 0.05, 0.01
 """Of a motion at its start, over its largest displacement: refused, and warned of."""
 INSTANTS = 513
@@ -66,6 +68,8 @@ def _warn(text: str) -> None:
 def check_units(lattice: Lattice, vertices: Floats) -> None:
     """Refuses units whose edges cross, or run clockwise, and ligaments without length.
 
+    Neither may `vertices` (n_vertices, 2), in mm, change the ligaments of the lattice.
+
     Raises:
         SceneError: naming the unit or the ligament.
     """
@@ -87,6 +91,21 @@ def check_units(lattice: Lattice, vertices: Floats) -> None:
             f"the ligament between units {one} and {other} has no length"
             f" ({lengths.min():.3g} mm); keep corners of neighbours apart",
             "lattice.ligament_length",
+        )
+    _keep_vectors(lattice, vertices)
+
+
+def _keep_vectors(lattice: Lattice, vertices: Floats) -> None:
+    """Refuses vertices between which ligaments are other than the lattice's: its own are solved."""
+    ends = np.asarray(vertices)[lattice.ligaments]
+    away = np.linalg.norm(ends[:, 1] - ends[:, 0] - lattice.ligament_vectors, axis=1)
+    if away.max(initial=0.0) > ROUNDING * lattice.spacing:
+        one, other = lattice.ligament_units[away.argmax()]
+        raise SceneError(
+            f"the vertices change the ligament between units {one} and {other} by {away.max():.3g}"
+            " mm against the lattice's; move both its ends alike, or let the lattice have them, by"
+            " replace(lattice, vertices=vertices)",
+            "lattice",
         )
 
 

@@ -37,7 +37,11 @@ class Perturbation:
 
 @dataclass(frozen=True)
 class PerturbedStructure:
-    """A structure with its vertices off their place and its constants off their value."""
+    """A structure with its vertices off their place and its constants off their value.
+
+    Where the units were assembled off their place, ligaments join them as they lie: a scene of it
+    needs ``dataclasses.replace(lattice, vertices=vertices)``. Otherwise they keep their vectors.
+    """
 
     vertices: Floats  # (n_vertices, 2) mm
     material: Material  # its constants, where they differ by ligament or unit as arrays

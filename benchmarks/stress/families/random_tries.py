@@ -176,10 +176,10 @@ def grids(small: bool) -> Iterator[StressCase]:
 
 def _crumpled(seed: int) -> Sequence[Check]:
     random = np.random.default_rng(seed)
-    case = pressed(squares(5), float(random.uniform(0.05, 0.15)))
-    shift = random.uniform(-1.0, 1.0, case.vertices.shape)
-    corners = replace(case, vertices=case.vertices + 0.75 * shift)
-    return _traced(corners, np.append(np.sort(random.uniform(0.05, 1.0, 7)), 1.0))
+    lattice, share = squares(5), float(random.uniform(0.05, 0.15))
+    shift = random.uniform(-1.0, 1.0, lattice.vertices.shape)
+    crumpled = replace(lattice, vertices=lattice.vertices + 0.75 * shift)
+    return _traced(pressed(crumpled, share), np.append(np.sort(random.uniform(0.05, 1.0, 7)), 1.0))
 
 
 @endless_family
@@ -192,11 +192,14 @@ def _bent(seed: int) -> Sequence[Check]:
     random = np.random.default_rng(seed)
     length = int(random.integers(5, 16))
     ramp: MotionLaw = LinearRamp(-0.3 * length, 1.0)
-    chain = posed(quads(length, 1, 15.0, 2.25, 0.0), [0], [length - 1], ramp, static=True)
+    chain = quads(length, 1, 15.0, 2.25, 0.0)
     size = 10.0 ** random.uniform(-8.0, -0.5)
     bow = size * np.sin(np.pi * chain.vertices[:, 0] / np.ptp(chain.vertices[:, 0]))
     bent = replace(chain, vertices=chain.vertices + np.stack([0.0 * bow, bow], axis=1))
-    return _traced(bent, np.append(np.sort(random.uniform(0.01, 1.0, 7)), 1.0))
+    return _traced(
+        posed(bent, [0], [length - 1], ramp, static=True),
+        np.append(np.sort(random.uniform(0.01, 1.0, 7)), 1.0),
+    )
 
 
 def _traced(case: StressScene, loads: Floats) -> Sequence[Check]:

@@ -117,6 +117,21 @@ def test_units_that_cross_themselves_are_refused() -> None:
         solve_case(StaticSolver(rig.topology, np.ones(1)), values, rig.drive)
 
 
+def test_vertices_that_change_ligaments_are_refused() -> None:
+    """With a plan as well; the lattice may have them."""
+    lattice = rotating_squares()
+    ends = lattice.ligaments[0]
+    shifted, turned = lattice.vertices.copy(), lattice.vertices.copy()
+    shifted[ends] += 0.5
+    turned[ends[0]] += 0.5
+    sim.simulate(scene(), vertices=shifted)
+    for plan in (None, sim.make_plan(scene())):
+        with pytest.raises(SceneError, match=r"units 0 and 1 by 0\.707 mm .* replace\(latt"):
+            sim.simulate(scene(), vertices=turned, plan=plan)
+    crooked = scene(lattice=replace(lattice, vertices=turned))
+    assert check_scene(crooked) == ()
+
+
 def test_a_small_jump_and_a_loose_unit_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:
     noisy = scene(series(start=0.03), **MOVING)
     assert "starts with a jump, of 0.015" in check_scene(noisy)[0]
