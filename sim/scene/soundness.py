@@ -110,7 +110,7 @@ def _keep_vectors(lattice: Lattice, vertices: Floats) -> None:
 
 
 def _check_ids(scene: Scene) -> None:
-    """Refuses units and degrees of freedom that there are not."""
+    """Refuses units and degrees of freedom that there are not, and units that count twice."""
     loads, n = scene.loads, scene.lattice.n_units
     frozen = scene.design.frozen
     named = {
@@ -126,8 +126,17 @@ def _check_ids(scene: Scene) -> None:
         every = np.concatenate([np.zeros(0, dtype=np.int64), *ids])
         if len(wrong := every[(every < 0) | (every >= n)]) > 0:
             raise SceneError(f"there is no unit {wrong[0]}; the lattice has 0 to {n - 1}", key)
+    for key in ("drive.units", "objective.region"):
+        for each in named[key]:
+            _once(each, key)
     for dof in {dof for each in loads.supports for dof in each.dofs} - set(DOFS):
         raise SceneError(f"there is no {dof!r}; the dofs are {', '.join(DOFS)}", "supports")
+
+
+def _once(ids: Ints, key: str) -> None:
+    found, count = np.unique(ids, return_counts=True)
+    if len(twice := found[count > 1]) > 0:
+        raise SceneError(f"unit {twice[0]} is listed twice, and would count so; list it once", key)
 
 
 def check_cases(scene: Scene, numbers: Iterable[int]) -> None:

@@ -206,7 +206,7 @@ def held_values(held: Ints, driven: Ints, motion: Numbers, control: Ints | None 
     component is, by default a displacement.
 
     Raises:
-        ValueError: a driven dof is not among the held ones.
+        ValueError: a driven dof is not among the held ones, or a unit is driven twice.
     """
     return selected(held_selection(held, driven, control), motion)
 
@@ -215,9 +215,11 @@ def held_selection(held: Ints, driven: Ints, control: Ints | None = None) -> Flo
     """Tells by ones which held dof (n_held) each component of the driven units (3 n_driven) is.
 
     Raises:
-        ValueError: a driven dof is not among the held ones.
+        ValueError: a driven dof is not among the held ones, or a unit is driven twice.
     """
     units = np.asarray(driven)
+    if len(np.unique(units)) < len(units):
+        raise ValueError("a driven unit is listed twice: its motions would add up")
     dofs = 3 * units[:, None] + np.arange(3)
     kinds = np.full(dofs.shape, DISPLACEMENT) if control is None else np.asarray(control)
     loaded = loaded_units(units, kinds)

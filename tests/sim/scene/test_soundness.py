@@ -50,6 +50,11 @@ REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
     "driven": (scene(cases=(sim.PrescribedMotion(np.array([25]), sim.LinearRamp(-1.0, 1.0)),)),
                "no unit 25", "drive.units"),
     "of interest": (scene(region=np.array([25])), "no unit 25", "objective.region"),
+    "driven twice": (
+        scene(cases=(sim.PrescribedMotion(np.array([4, 9, 4]), sim.LinearRamp(-1.0, 1.0)),)),
+        "unit 4 is listed twice", "drive.units",
+    ),
+    "of interest twice": (scene(region=np.array([7, 7])), "unit 7 is listed", "objective.region"),
     "redesigned": (scene(cloak=np.array([25])), "no unit 25", "cloak"),
     "kept": (scene(frozen=np.array([25])), "no unit 25", "cloak"),
     "a list": (scene(region=[12]), "no array of integers", "objective.region"),

@@ -56,3 +56,5 @@ def test_all_driven_units_follow_and_the_clamped_rest(motion: sim.MotionLaw) -> 
     np.testing.assert_array_equal(values, np.hstack([one, np.zeros_like(one), one]))
     with pytest.raises(ValueError, match="must be held"):
         held_values(held, np.array([2]), one)
+    with pytest.raises(ValueError, match="listed twice"):
+        held_values(held, np.array([0, 0]), one)
