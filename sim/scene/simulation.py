@@ -114,7 +114,7 @@ def simulate(
     times: Floats | None = None,
     cases: Iterable[int] | None = None,
     plan: Plan | None = None,
-    threads: int = 1,
+    threads: int | None = None,
 ) -> Response:
     """Simulates a structure under the load cases of a scene.
 
@@ -130,13 +130,14 @@ def simulate(
         times: (n_times,) of the output, s; by default those of the loss.
         cases: numbers of the load cases; by default all, or those of the ``plan``.
         plan: of `make_plan`, to be made once where many designs are simulated alike.
-        threads: cases solved side by side.
+        threads: cases solved side by side; by default one, or as many as the ``plan`` has.
 
     Raises:
+        ValueError: times are given beside a plan, which has its own.
         SimulationError: a step failed even after it was cut; the error names it.
         SceneError: the scene or its structure has no meaning.
     """
-    made = plan or make_plan(scene, vertices, times, threads, every_case=True)
+    made = _planned(scene, vertices, times, plan, threads)
     chosen = tuple(int(case) for case in (made.simulated if cases is None else cases))
     check_cases(scene, chosen)
     if vertices is not None or design is None:
@@ -153,6 +154,24 @@ def simulate(
         check_units(scene.lattice, np.asarray(scene.space.vertices(design)))
     empty = Response(scene, made, concrete(values), chosen, np.empty(0), np.empty(0))
     return _solved(empty, (made.solver,) * len(chosen))
+
+
+def _planned(
+    scene: Scene,
+    vertices: Floats | None,
+    times: Floats | None,
+    plan: Plan | None,
+    threads: int | None,
+) -> Plan:
+    """Makes a plan, or lets a given one have the threads that are asked for."""
+    if plan is None:
+        return make_plan(scene, vertices, times, threads or 1, every_case=True)
+    if times is not None:
+        raise ValueError("a plan has its own times: give make_plan the times, or leave one out")
+    solver: Any = plan.solver
+    if threads in (None, solver.threads):
+        return plan
+    return replace(plan, solver=replace(solver, threads=threads))
 
 
 def drive_force(scene: Scene, seen: Observables, drive: PrescribedMotion, times: Floats) -> Floats:

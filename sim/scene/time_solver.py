@@ -19,7 +19,14 @@ from sim.core import Floats, SimulationError
 from sim.energy import Topology
 from sim.linalg import OF_MOTIONS
 from sim.scene.scene import DIRECTED, Accuracy, Scene
-from sim.solvers import PrescribedMotion, Pulse, breakpoints, single_motions, solve_case
+from sim.solvers import (
+    PrescribedMotion,
+    Pulse,
+    breakpoints,
+    check_masses,
+    single_motions,
+    solve_case,
+)
 from sim.structure import ConcreteParameters
 from sim.time_integration import (
     BLANES_MOAN,
@@ -96,6 +103,9 @@ def time_solver(
     Without a `gradient` to be asked for, implicit stages are solved as motions need it. What was
     decided is appended to `decisions`, a line each, and to `warnings` if the accuracy is
     not reached.
+
+    Raises:
+        SimulationError: a unit has no mass.
     """
     error = _Error(scene, values, float(times[-1]))
     explicit = _explicit(scene, values, times, threads)
@@ -351,6 +361,7 @@ def _size(
 def _explicit(
     scene: Scene, values: ConcreteParameters, times: Floats, threads: int
 ) -> ExplicitSolver:
+    check_masses(values)
     end, accuracy = float(times[-1]), scene.numerics.accuracy
     highest = STIFFENING * highest_frequency(scene.topology, values)
     largest = STABLE_FRACTION[accuracy] * BLANES_MOAN.stability / max(highest, 1e-300)

@@ -87,11 +87,7 @@ class ExplicitSolver:
             if needed <= stable:
                 return u, v, ExplicitRecord(steps, checkpoints, top)
             stable = needed
-        raise SimulationError(
-            f"the explicit run is unstable or leaves the admissible states (step {failed}) even"
-            f" with {steps.n_steps} steps; try a smaller drive or a larger smallest edge",
-            step=failed,
-        )
+        raise _failure(failed, steps.n_steps, stable)
 
     def adjoint_memory(self) -> int:
         """Counts the bytes that checkpoints and one segment's states take."""
@@ -182,6 +178,21 @@ class ExplicitSolver:
     def _outputs(self, n_steps: int) -> Outputs:
         times = np.linspace(0, self.duration, n_steps + 1)
         return Outputs(*time_grid.hermite_stencils(times, self.output_times))
+
+
+def _failure(failed: int, n_steps: int, needed: int) -> SimulationError:
+    """Says what stopped the last run: a step `failed` of its `n_steps`, or none (-1)."""
+    remedy = "try a smaller drive or a larger smallest edge"
+    if failed < 0:
+        return SimulationError(
+            f"the explicit run comes to states that need {needed} steps to be stable, after"
+            f" {MAX_REFINEMENTS} tries, the last with {n_steps}; {remedy}"
+        )
+    return SimulationError(
+        f"the explicit run is unstable or leaves the admissible states (step {failed}) even"
+        f" with {n_steps} steps; {remedy}",
+        step=failed,
+    )
 
 
 def _segment(n_steps: int) -> int:

@@ -12,8 +12,8 @@ NEAR = 1e-7
 def graded(duration: float, first: float, growth: float, largest: float) -> Floats:
     """Grid from 0 to ``duration`` (s) whose steps grow geometrically up to ``largest``.
 
-    A drive that starts with a velocity jump needs short steps first. The number of steps is even,
-    and the grid's shape depends on its arguments alone, so it can be halved and frozen.
+    A drive that starts with a velocity jump needs short steps first. The grid's shape depends on
+    its arguments alone, so it can be frozen.
     """
     n_growing = int(np.ceil(np.log(largest / first) / np.log(growth)))
     steps = np.minimum(first * growth ** np.arange(n_growing + 1), largest)

@@ -104,6 +104,16 @@ def test_a_structure_is_given_by_its_design_or_its_vertices() -> None:
     np.testing.assert_allclose(by_design, by_vertices.displacement, atol=1e-12)
 
 
+def test_a_plan_keeps_its_times_and_takes_threads() -> None:
+    plan = sim.make_plan(scene(), threads=2)
+    with pytest.raises(ValueError, match="a plan has its own times"):
+        sim.simulate(scene(), times=np.array([0.5]), plan=plan)
+    taken = [
+        sim.simulate(scene(), plan=plan, threads=asked).plan.solver.threads for asked in (None, 3)
+    ]
+    assert taken == [2, 3]
+
+
 def test_times_and_cases_can_be_chosen() -> None:
     motions = [sim.LinearRamp(-2.0, 1.0, angle) for angle in (0.0, 0.4)]
     two = scene().driven_by(*motions)

@@ -55,6 +55,14 @@ def test_errors_are_those_that_were_asked_for_and_stated(drive: str) -> None:
     assert abs(losses[0] / right - 1) / 3 < stated_loss
 
 
+def test_a_motion_of_units_without_mass_is_refused() -> None:
+    scene = posed(DRIVES["slow"])
+    weightless = scene.updated(material=scene.structure.material._replace(density=0.0))
+    for integrator in ("auto", "explicit"):
+        with pytest.raises(sim.SimulationError, match="unit 0 has no mass"):
+            sim.make_plan(weightless.updated(integrator=integrator))
+
+
 def test_numbers_of_a_drive_may_be_arrays() -> None:
     one, other = sim.Harmonic(3.0, 5.0, 0.6), sim.Harmonic(jnp.array(3.0), jnp.array(5.0), 1.0)
     scene = posed(one)

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import sim.time_integration.explicit
 from benchmarks.scenes import BARRIER, CUTOFF
 from sim.core import Floats, SimulationError
 from sim.energy import hessian_product, locate, observe, system_of, workspace
@@ -72,6 +73,14 @@ def test_a_step_beyond_the_stability_limit_is_cut() -> None:
         rig.values, rig.drive
     )[0]
     np.testing.assert_allclose(u, fine, atol=2e-2 * np.abs(fine).max())
+
+
+def test_states_that_ask_for_more_steps_are_no_failed_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sim.time_integration.explicit, "MAX_REFINEMENTS", 1)
+    rig = shaken(4.0)
+    with pytest.raises(SimulationError, match=r"states that need \d+ steps to be") as failure:
+        solver_for(rig, 40).forward(rig.values, rig.drive)
+    assert failure.value.step is None
 
 
 def test_units_overlap_in_no_output_between_two_steps() -> None:
