@@ -19,7 +19,7 @@ LOG = logging.getLogger(__name__)
 
 SHORTEST_LIGAMENT = 1e-6
 """Of a ligament at rest, over the spacing: its law divides by its length."""
-ROUNDING = 1e-6
+ROUNDING = 1e-5
 """Over the spacing, by which a ligament may differ between given vertices and the lattice."""
 JUMP, SOME_JUMP = 0.05, 0.01
 """Of a motion at its start, over its largest displacement: refused, and warned of."""
