@@ -10,11 +10,15 @@ from reports.base import ALTERED
 
 
 def reasons(problem: Problem, study: Problem) -> list[str]:
-    """Lists where `problem`, a preset of `study`, is less than that; empty at full size."""
+    """Lists where `problem`, a preset of `study`, is less than that; empty at full size.
+
+    Only what both have is compared: a force is no less than a displacement.
+    """
+    full = _sizes(study)
     reduced = [
-        f"{ours:g} {what} instead of {full:g}"
-        for (what, ours), full in zip(_sizes(problem).items(), _sizes(study).values(), strict=True)
-        if ours < full
+        f"{ours:g} {what} instead of {full[what]:g}"
+        for what, ours in _sizes(problem).items()
+        if ours < full.get(what, ours)
     ]
     if problem.solver.accuracy == "draft":
         reduced.append("accuracy of the solver: draft")
@@ -22,22 +26,29 @@ def reasons(problem: Problem, study: Problem) -> list[str]:
 
 
 def _sizes(problem: Problem) -> dict[str, float]:
-    drive, sweep, robustness = problem.drive, problem.sweep, problem.robustness
-    directions = drive.directions if isinstance(drive, HarmonicDrive | RampHarmonicDrive) else ()
-    first = single_drives(drive)[0]
-    moved = {"mm": "displacement", "rad": "rotation"}.get(first.unit, "load")
+    sweep, robustness = problem.sweep, problem.robustness
     sqp = problem.optimiser.methods.sqp
-    static = problem.static
     return {
         "units": problem.lattice.n_units,
-        "load angles": len(directions),
-        f"{first.unit} of driven {moved}": getattr(first, "amplitude", 0.0) if static else 0.0,
-        "load steps in the loss": problem.horizon.steps or 0,
+        **_load_sizes(problem),
         "evaluations of the design": sqp.evaluations if sqp else 0,
-        "drive cycles": 0 if static else problem.response.cycles,
         "cases in the sweep": case_count(sweep) if sweep else 0,
         "imperfect copies": robustness.samples if robustness else 0,
     }
+
+
+def _load_sizes(problem: Problem) -> dict[str, float]:
+    """Measures the load by what its kind has: static ones an amplitude, others cycles."""
+    drive = problem.drive
+    if not problem.static:
+        turned = isinstance(drive, HarmonicDrive | RampHarmonicDrive)
+        angles = {"load angles": float(len(drive.case_weights))} if turned else {}
+        return angles | {"drive cycles": problem.response.cycles}
+    first = single_drives(drive)[0]
+    moved = {"mm": "displacement", "rad": "rotation"}.get(first.unit, "load")
+    amplitude = getattr(first, "amplitude", None)
+    driven = {} if amplitude is None else {f"{first.unit} of driven {moved}": abs(amplitude)}
+    return driven | {"load steps in the loss": problem.horizon.steps or 0}
 
 
 def mark(figure: Figure) -> None:

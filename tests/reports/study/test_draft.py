@@ -1,0 +1,42 @@
+from pathlib import Path
+
+import pytest
+import yaml
+
+from pipeline import problem
+from pipeline.problem import Problem
+from reports.study import draft
+from tests.pipeline import static
+
+
+def driven(folder: Path, **drive: str) -> Problem:
+    """Writes a small compressed lattice with a drive of its right column."""
+    path = static.write(folder, static.HOLE, size=5)
+    asked = yaml.safe_load(path.read_text())
+    asked["drive"] = {"units": "right", **drive}
+    path.write_text(yaml.safe_dump(asked))
+    return problem.load(path)
+
+
+def torque(folder: Path, amplitude: float) -> Problem:
+    return driven(folder, kind="torque", amplitude=f"{amplitude} N mm")
+
+
+@pytest.mark.parametrize(
+    ("ours", "reason"),
+    [
+        (-300.0, []),
+        (-200.0, []),
+        (-100.0, ["100 N mm of driven load instead of 200"]),
+    ],
+)
+def test_loads_are_compared_by_their_size(tmp_path: Path, ours: float, reason: list[str]) -> None:
+    assert draft.reasons(torque(tmp_path, ours), torque(tmp_path, -200.0)) == reason
+
+
+def test_a_force_is_no_less_than_a_displacement(tmp_path: Path) -> None:
+    push = driven(tmp_path, kind="force", amplitude="5 N", direction="180 deg")
+    ramp = {"kind": "linear_ramp", "duration": "1 s", "direction": "180 deg"}
+    shift = driven(tmp_path, amplitude="15 mm", **ramp)
+    assert draft.reasons(push, shift) == []
+    assert draft.reasons(shift, push) == []
