@@ -14,7 +14,7 @@ from reports.base import Table, prose, style
 from reports.facts import headed
 from reports.page import FigureText, figure_page, publish, titled
 from reports.panels import draw
-from reports.study import from_dataset, study_results
+from reports.study import draft, from_dataset, study_results
 
 _PROSE = prose(__file__)
 _FILES = ("transmission.csv", "modes.csv", "bands.csv")
@@ -41,7 +41,15 @@ def report(args: argparse.Namespace) -> None:
         Table(file, words, _columns(data[name]))
         for file, (name, words) in zip(_FILES, _PROSE["tables"].items(), strict=True)
     ]
-    made = figure_page("spectrum", text, lambda: draw_spectrum(data, asked), tables, data)
+    reduced = draft.reasons(asked, problem.load(args.problem))
+
+    def drawn() -> Figure:
+        figure = draw_spectrum(data, asked)
+        if reduced:
+            draft.mark(figure)
+        return figure
+
+    made = figure_page("spectrum", text, drawn, tables, data, draft=reduced)
     publish(made, args.out_dir)
 
 

@@ -1,6 +1,9 @@
 """Text of static problems: the authors' scenes, and small ones that are quick to solve."""
 
+from copy import deepcopy
 from pathlib import Path
+
+import yaml
 
 from pipeline.__main__ import run_stage
 
@@ -58,6 +61,14 @@ SHIELD = (
     "objective: { kind: strain_energy, target: rest, region: { disc: { radius: 67.5 mm } } }\n"
 )
 HOLE = "void: { disc: { radius: 7 mm } }\ncloak: { disc: { radius: 22 mm } }\n" + MIMIC
+
+
+def as_draft(problem: Path, evaluations: int) -> None:
+    """Makes a problem the preset `quick` of one that designs with more evaluations."""
+    content = yaml.safe_load(problem.read_text())
+    content["presets"] = {"quick": {"optimiser": deepcopy(content["optimiser"])}}
+    content["optimiser"]["methods"]["sqp"]["evaluations"] = evaluations
+    problem.write_text(yaml.safe_dump(content))
 
 
 def designed(problem: Path, *more: str) -> Path:

@@ -2,6 +2,7 @@ from . import curves as curves
 from . import facts as facts
 from . import figure as figure
 from . import measures as measures
+from .abscissa import Abscissa as Abscissa
 from .abscissa import abscissa_of as abscissa_of
 from .abscissa import structures as structures
 from .contact_comparison import overlapping as overlapping

@@ -13,6 +13,7 @@ from pipeline.problem.sections import (
     selected_units,
     single_drives,
 )
+from reports.facts import headed
 from reports.figures.loading_path.drive_response import driven_displacement
 from sim.core import Floats
 
@@ -57,6 +58,12 @@ class Abscissa:
     def label(self) -> str:
         """Labels an axis."""
         return f"{self.name} {self.symbol} ({self.unit})"
+
+    @property
+    def column(self) -> str:
+        """Heads a column of a table."""
+        name = "displacement" if self.displaces else self.name.lower().replace(",", "")
+        return headed(name.replace(" ", "_"), self.unit)
 
     def at(self, sample: int) -> str:
         """Returns the value at a sample in words, with the paper's label of it."""

@@ -48,10 +48,7 @@ def path(study: StudyResults) -> Columns:
     measure = measures.measure_of(problem)
     columns: Columns = {"time_s": response["time"].values}
     if way.static:
-        name = (
-            "displacement" if way.displaces else way.name.lower().replace(",", "").replace(" ", "_")
-        )
-        columns[headed(name, way.unit)] = way.values
+        columns[way.column] = way.values
     answer = drive_response(problem)
     series = {
         headed(measure.key, measure.unit): measure.of(response),

@@ -7,12 +7,12 @@ from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.posing import under_worst
 from reports.base import prose
-from reports.facts import fact_records
+from reports.facts import claims, fact_records
 from reports.figures import kinds
 from reports.page import Report, publish, study_page, study_text
 from reports.products.certificate.facts import certificate_facts
 from reports.products.certificate.figure import CertifiedDesign, certificate_figure
-from reports.study import StudyResults, study_results
+from reports.study import StudyResults, draft, study_results
 
 HEADLINE = ("worst_found", "mean", "worst_over_mean", "nominal", "reduction")
 """Keys of the facts that stand above all others."""
@@ -60,4 +60,7 @@ def report(args: argparse.Namespace) -> None:
         {path.name: provenance.file_hash(path) for path in files},
         others={"certificate": data},
     )
+    if not claims.judged(worst.target, []):  # claims are on designs in their own right
+        reduced = draft.reasons(asked, problem.load(args.problem))
+        worst = replace(worst, draft=tuple(reduced))
     publish(certificate_report(CertifiedDesign(data, worst)), args.out_dir)

@@ -14,6 +14,7 @@ from pipeline.posing import greatest_loss, worst_load
 from pipeline.problem.sections import SeveralDrives
 from reports.base import Table, prose, style
 from reports.facts import headed
+from reports.figures.loading_path import Abscissa, abscissa_of
 from reports.panels import (
     CLAMP_TINT,
     CLOAK_TINT,
@@ -76,6 +77,11 @@ class CertifiedDesign:
         order = ("direction", "amplitude") if self.harmonic else ("amplitude", "direction")
         varied = [name for name in order if np.ptp(self.data[f"load_{name}"].values) > 0.0]
         return across, (varied or order)[0]
+
+    @cached_property
+    def path(self) -> Abscissa:
+        """Returns the course of the worst load: time, or what is applied along its path."""
+        return abscissa_of(self.worst.problem, self.worst.response)
 
     @cached_property
     def size(self) -> xr.DataArray:
@@ -146,7 +152,7 @@ def certificate_figure(found: CertifiedDesign) -> PanelFigure:
         Panel((letter, title, left, top), drawn, _PROSE[letter].format(**words), tables)
         for letter, (title, left, top, drawn, tables) in heads.items()
     ]
-    return PanelFigure(_HEIGHT, panels)
+    return PanelFigure(_HEIGHT, panels, found.worst.draft)
 
 
 def _tables(data: xr.Dataset) -> list[Table]:
@@ -167,7 +173,7 @@ def _tables(data: xr.Dataset) -> list[Table]:
 
 
 def _series(found: CertifiedDesign) -> dict[str, Floats]:
-    columns = {"time_s": found.missed["time"].values}
+    columns = {found.path.column: found.path.values}
     for name in _structures(found):
         missed = found.missed.sel(structure=name)
         columns[headed(f"missed_{name}", missed.attrs.get("units", "1"))] = missed.values
@@ -302,10 +308,11 @@ def _missed(axes: Axes, found: CertifiedDesign) -> None:
     for name in _structures(found):
         colour = style.STRUCTURE_COLOURS[name]
         values = missed.sel(structure=name)
-        axes.plot(missed["time"], values, color=colour, label=name.capitalize(), lw=1.0)
+        axes.plot(found.path.values, values, color=colour, label=name.capitalize(), lw=1.0)
     mimics = found.worst.problem.objective.target == "intact"
     size = r"rms of $\|\mathbf{U}-\mathbf{U}^*\|$" if mimics else r"rms of $\|\mathbf{U}\|$"
-    axes.set(xlabel="$t$ (s)", ylabel="region's energy (N mm)" if found.by_energy else size)
-    axes.set_xlim(0.0, float(missed["time"][-1]))
+    path = found.path
+    axes.set(xlabel=path.label, ylabel="region's energy (N mm)" if found.by_energy else size)
+    axes.set_xlim(path.values[0], path.values[-1])
     axes.set_ylim(bottom=0.0)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, columnspacing=0.8)

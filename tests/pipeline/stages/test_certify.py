@@ -72,8 +72,8 @@ def certified(
     return {f"--{name}": file for name, file in files.items()}
 
 
-def page_of(problem: Path, files: dict[str, str], folder: Path) -> str:
-    words = ["--problem", str(problem), "--quiet", "--out-dir", str(folder)]
+def page_of(problem: Path, files: dict[str, str], folder: Path, *more: str) -> str:
+    words = ["--problem", str(problem), *more, "--quiet", "--out-dir", str(folder)]
     assert main(["certificate", *words, *sum(files.items(), ())]) == 0
     return (folder / "index.html").read_text(encoding="utf-8")
 
@@ -106,6 +106,17 @@ def test_the_page_shows_the_worst_load(
     altered = float(response["loss"].sel(structure="altered"))
     reduction = 1 - float(response["loss"].sel(structure="cloaked")) / altered
     assert facts["reduction"].value == pytest.approx(100 * reduction)
+    assert "DRAFT" not in text
+    static.as_draft(path, 30)
+    assert "3 evaluations of the design instead of 30" in page_of(
+        path, files, tmp_path / "quick", "--preset", "quick"
+    )
+    own = {"study": f"{tmp_path.name}@quick"}  # which makes it a design in its own right
+    ours = claims.Claims.model_validate({"source": "this test", "claims": [claim | own]})
+    monkeypatch.setattr(claims, "own", lambda: ours)
+    claimed = page_of(path, files, tmp_path / "claimed", "--preset", "quick")
+    assert "DRAFT" not in claimed
+    assert "Claims that hold: 1 of 1 in simulation" in claimed
 
 
 FROM_ABOVE = (
@@ -124,6 +135,10 @@ def test_the_page_of_a_path(setups: str, tmp_path: Path, monkeypatch: pytest.Mon
     assert ("set-up " in text) == bool(setups)
     assert "motion of the intact lattice" in text
     assert 'id="player-data"' in text
+    table = pd.read_csv(tmp_path / "page" / "worst_load.csv", comment="#")
+    worst = datasets.read(tmp_path / "response.nc", "response")
+    reached = float(worst["amplitude"][0])
+    assert table["displacement_mm"].iloc[[0, -1]].tolist() == pytest.approx([0.0, reached])
 
 
 @pytest.mark.slow

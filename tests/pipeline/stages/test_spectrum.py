@@ -8,7 +8,7 @@ from pipeline import datasets
 from pipeline.__main__ import run_stage
 from reports.__main__ import main
 from tests.pipeline.conftest import Failing
-from tests.pipeline.static import HOLE, write
+from tests.pipeline.static import HOLE, as_draft, write
 
 ASKED = """
 spectrum:
@@ -104,6 +104,15 @@ def test_the_page_holds_the_figure_and_its_curves(analysed: Path, tmp_path: Path
     assert b"<svg" in pages[0]["index.html"]
     assert pages[0]["modes.csv"].startswith(b"structure,state,mode,value_Hz\n")
     assert pages[0]["modes.csv"].count(b"\n") == 1 + 3 * 2 * 4
+
+
+def test_the_page_of_a_draft_says_so(analysed: Path, tmp_path: Path) -> None:
+    words = options(tmp_path)
+    as_draft(tmp_path / "problem.yaml", 8)
+    drawn = ["--spectrum", str(analysed), "--out-dir", str(tmp_path / "page")]
+    assert main(["spectrum", *words, "--preset", "quick", *drawn]) == 0
+    page = (tmp_path / "page/index.html").read_text()
+    assert "DRAFT — a quick look, not the study itself: 4 evaluations" in page
 
 
 def test_a_spectrum_of_another_problem_is_refused(
