@@ -37,7 +37,7 @@ def moved_parts(asked: RigidParts, folder: Path) -> Iterator[MovedPart]:
     """
     place = folder / asked.folder
     table = place / asked.reference
-    pictures = {_number(path): path for path in sorted(place.glob("*.png"))}
+    pictures = numbered_pictures(place)
     first = _number(place / asked.first)
     for frame, part, *motion in csv_columns.read_columns(table, asked.columns):
         if int(frame) == first:
@@ -50,6 +50,11 @@ def moved_parts(asked: RigidParts, folder: Path) -> Iterator[MovedPart]:
         before, after = read_pictures(place / asked.first, pictures[int(frame)])
         patch = Patch(before, after, np.array(one.outline), np.array(one.centre))
         yield MovedPart(int(frame), int(part), patch, np.array(motion))
+
+
+def numbered_pictures(folder: Path) -> dict[int, Path]:
+    """Lists the pictures of a folder by the number at the end of their names."""
+    return {_number(path): path for path in sorted(folder.glob("*.png"))}
 
 
 def _number(path: Path) -> int:

@@ -1,6 +1,6 @@
 """Draws parts tracked in real pictures beside another program's result, and a located specimen."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
+from pipeline.calibration import numbered_pictures
 from pipeline.calibration.inputs import KnownPictures
+from pipeline.runtime import UserError
 from pipeline.tracking.frames import read_picture
 from pipeline.tracking.motion import moved_outline
 from reports.base import style
@@ -51,9 +53,7 @@ def draw_pictures(made: xr.Dataset, asked: KnownPictures, folder: Path) -> Figur
     parts = asked.rigid_parts
     outlines = [np.array(each.outline) for each in parts.parts]
     at = np.linspace(0, made.sizes["frame"] - 1, _SHOWN).round().astype(int)
-    pictures = sorted((folder / parts.folder).glob("*.png"))
-    frames = made["frame"].values
-    shown = [path for frame in frames[at] for path in pictures if path.stem.endswith(str(frame))]
+    shown = pictures_of_frames(folder / parts.folder, made["frame"].values[at].tolist())
     points = np.concatenate(outlines)
     reach = points.min(axis=0) - _ABOUT, points.max(axis=0) + _ABOUT
     style.letter(drawn, 2.0, 1.0, "a", "At rest, and tracked")
@@ -73,6 +73,16 @@ def draw_pictures(made: xr.Dataset, asked: KnownPictures, folder: Path) -> Figur
     axes = style.place(drawn, 28.0, 124.0, 124.0, 80.0)
     _specimen(axes, made, read_picture(folder / asked.specimen.file))
     return drawn
+
+
+def pictures_of_frames(folder: Path, frames: Sequence[int]) -> list[Path]:
+    """Finds the pictures of frames by their numbers."""
+    pictures = numbered_pictures(folder)
+    for frame in frames:
+        if frame not in pictures:
+            remedy = "give the folder whose pictures were studied"
+            raise UserError("no picture of a frame", file=folder, value=frame, remedy=remedy)
+    return [pictures[frame] for frame in frames]
 
 
 def _show(axes: Axes, image: Image, reach: tuple[Floats, Floats]) -> None:

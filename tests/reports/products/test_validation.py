@@ -10,8 +10,9 @@ from pipeline.calibration.inputs import KnownPictures, LoadCycles, Population
 from pipeline.datasets import provenance
 from pipeline.datasets.tables import TABLES
 from pipeline.problem.reading import load_section
-from pipeline.runtime import ROOT
+from pipeline.runtime import ROOT, UserError
 from reports.__main__ import main
+from reports.products.validation.pictures import pictures_of_frames
 from reports.products.validation.validation_report import relative_error
 from tests.reports.conftest import Failing
 
@@ -95,3 +96,12 @@ def test_it_tells_the_errors_and_their_sign(page: str) -> None:
     assert "the median is below the measured force everywhere" in page
     rms = 100 * np.sqrt((relative_error(made_up(), "median") ** 2).mean())
     assert f"<strong>{rms:.1f} %</strong><span>error of the median" in page
+
+
+def test_pictures_are_those_of_the_frames(tmp_path: Path) -> None:
+    for number in (1, 11, 21):
+        (tmp_path / f"frame_{number:04}.png").touch()
+    found = pictures_of_frames(tmp_path, [1, 21])
+    assert [path.name for path in found] == ["frame_0001.png", "frame_0021.png"]
+    with pytest.raises(UserError, match="no picture of a frame"):
+        pictures_of_frames(tmp_path, [2])
