@@ -85,7 +85,7 @@ def images(painted: Painter, frames: Iterable[Frame]) -> Iterator[Image]:
         size = [side * painted.scale for side in painted.camera.size]
         big = np.asarray(cv2.resize(frame.image, size), np.uint8)
         drawn = _units(painted, np.repeat(big[..., None], 3, axis=2), index, last)
-        yield np.vstack([drawn, _told(painted, legend, index, frame.time, int(lost.sum()))])
+        yield np.vstack([drawn, _told(painted, legend, frame, int(lost.sum()))])
 
 
 def _palette(colours: Colormap) -> NDArray[np.uint8]:
@@ -161,9 +161,9 @@ def _legend(painted: Painter) -> Image:
     return band
 
 
-def _told(painted: Painter, legend: Image, index: int, time: float, lost: int) -> Image:
+def _told(painted: Painter, legend: Image, frame: Frame, lost: int) -> Image:
     band = legend.copy()
-    words = [f"frame {index}", f"{time:.3f} s", f"{lost} lost", painted.note]
+    words = [f"frame {frame.index}", f"{frame.time:.3f} s", f"{lost} lost", painted.note]
     text = "   ".join(word for word in words if word)
     wide = cv2.getTextSize(text, _FONT, 0.45, 1)[0][0]
     _write(band, text, band.shape[1] - wide - 10)

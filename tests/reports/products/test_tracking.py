@@ -158,6 +158,14 @@ def test_units_are_coloured_and_lost_ones_hatched(track: xr.Dataset) -> None:
     assert (drawn[-1][_about(2 * lost)] != drawn[0][_about(2 * lost)]).any()
 
 
+def test_a_frame_is_called_by_its_number_in_the_file(track: xr.Dataset) -> None:
+    painted = overlay.painter(track, "displacement")
+    first, later = (
+        next(overlay.images(painted, [Frame(number, 0.0, grey())])) for number in (0, 40)
+    )
+    assert (first != later).any()
+
+
 def _about(place: np.ndarray) -> tuple[slice, slice]:
     column, row = np.round(place).astype(int)
     return slice(row - 12, row + 12), slice(column - 12, column + 12)
