@@ -9,6 +9,7 @@ import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from string import ascii_lowercase
 from typing import Any
 
 import matplotlib as mpl
@@ -179,6 +180,12 @@ def log_values(axes: Axes) -> None:
 def short_numbers(axes: Axes) -> None:
     """Takes the power of ten out of numbers on the y axis that are all small, or large."""
     axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4))
+
+
+def numbered_letter(number: int) -> str:
+    """Returns the letter of a panel by its number from zero: a to z, then aa, ab and so on."""
+    first, last = divmod(number, len(ascii_lowercase))
+    return (numbered_letter(first - 1) if first else "") + ascii_lowercase[last]
 
 
 def letter(figure: Figure, left: float, top: float, name: str, title: str = "") -> None:

@@ -50,7 +50,7 @@ def draw_calibration(made: xr.Dataset) -> Figure:
     for number, name in enumerate(names):
         row, column = divmod(number, COLUMNS)
         left, top = _LEFT + column * _GAP, row * _ROW
-        style.letter(drawn, left - 9.0, top + 1.0, "abcdefghijklmnop"[number], name.capitalize())
+        style.letter(drawn, left - 9.0, top + 1.0, style.numbered_letter(number), name.capitalize())
         _set(drawn, made, number, (left, top + 8.0))
     _constants(drawn, made, rows * _ROW)
     if made.attrs["synthetic"] == "yes":
@@ -96,7 +96,7 @@ def _shown(chosen: xr.Dataset) -> xr.Dataset:
 def _constants(drawn: Figure, made: xr.Dataset, top: float) -> None:
     """Draws intervals relative to the values, and how much the errors go together."""
     names = [_WORDS[name] for name in made["parameter"].values]
-    last = "abcdefghijklmnop"[made.sizes["set"]]
+    last = style.numbered_letter(made.sizes["set"])
     style.letter(drawn, 2.0, top, last, "Constants: 95 % intervals")
     axes = style.place(drawn, 14.0, top + 7.0, 78.0, 26.0)
     value = made["value"].values

@@ -84,7 +84,9 @@ def front_figure(data: xr.Dataset, certified: Mapping[str, xr.Dataset]) -> Panel
     panels = []
     for k, each in enumerate(series):
         place = (k % count) * each_wide, (k // count) * _ROW, each_wide - _GAP
-        panels.append(_panel("abcdefghijkl"[k], each, certified, place, [] if k else [table]))
+        panels.append(
+            _panel(style.numbered_letter(k), each, certified, place, [] if k else [table])
+        )
     return PanelFigure(-(-len(series) // count) * _ROW, panels)
 
 
@@ -109,7 +111,7 @@ def _panel(
         if is_front:
             _front(axes, series, certified)
         else:
-            _losses(axes, series, name, legend=letter in "ab")
+            _losses(axes, series, name, legend=letter in {"a", "b"})
 
     title = "Own loads against the worst" if is_front else f"Over the {name}"
     caption = _PROSE["front"] if is_front else _PROSE["series"].format(parameter=f"the {name}")

@@ -1,10 +1,12 @@
 """Draws a spectrum: lowest modes, transmission of the drive, bands of the unit cell."""
 
 import argparse
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -25,6 +27,7 @@ SHOWN = 0.45
 _DECADES = 10.0
 """Spread of the transmission from which on its axis is logarithmic."""
 _BANDS = (style.INTACT, style.METHOD_COLOURS["mma"], style.ALTERED, style.CLOAKED)
+"""Colours of the bands, by compression; more compressions than these take a map's."""
 _SIDE, _PITCH, _LEFT, _TOP = 36.0, 41.5, 10.0, 9.0
 _ROW = _SIDE + 4.5
 
@@ -84,7 +87,7 @@ def draw_spectrum(data: xr.Dataset, asked: Problem) -> Figure:
     )
     _transmission(style.place(figure, 13.0, below + 14.0, 70.0, 42.0), data, asked)
     style.letter(figure, 95.0, below, "c", "Waves in the intact lattice")
-    _bands(style.place(figure, 108.0, below + 14.0, 64.0, 42.0), data)
+    bands_panel(style.place(figure, 108.0, below + 14.0, 64.0, 42.0), data)
     return figure
 
 
@@ -126,12 +129,12 @@ def _transmission(axes: Axes, data: xr.Dataset, asked: Problem) -> None:
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, columnspacing=1.0)
 
 
-def _bands(axes: Axes, data: xr.Dataset) -> None:
+def bands_panel(axes: Axes, data: xr.Dataset) -> None:
+    """Draws the waves of the intact lattice, a colour for each compression."""
     place = data["wave"].values
     handles = []
-    for share, lateral, colour in zip(
-        data["compression"].values, data["lateral_strain"].values, _BANDS, strict=False
-    ):
+    shares, laterals = data["compression"].values, data["lateral_strain"].values
+    for share, lateral, colour in zip(shares, laterals, _band_colours(len(shares)), strict=True):
         found = data["band_frequency"].sel(compression=share).transpose("wave", "band").values
         axes.plot(place, found / 1000, color=colour, linewidth=0.7)
         words = (
@@ -146,3 +149,10 @@ def _bands(axes: Axes, data: xr.Dataset) -> None:
     axes.legend(
         handles=handles, loc="lower left", bbox_to_anchor=(-0.12, 1.0), ncols=2, columnspacing=1.0
     )
+
+
+def _band_colours(count: int) -> Sequence[str]:
+    """Returns a colour for each compression."""
+    if count <= len(_BANDS):
+        return _BANDS[:count]
+    return [to_hex(style.MAGNITUDE(place)) for place in np.linspace(1.0, 0.25, count)]

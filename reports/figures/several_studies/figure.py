@@ -1,7 +1,7 @@
 """Composes several studies side by side: structures at the start and at full load, and curves."""
 
 from collections.abc import Iterator, Sequence
-from string import ascii_lowercase
+from itertools import count
 
 from matplotlib.figure import Figure
 
@@ -37,7 +37,7 @@ def several_studies_figure(studies: Sequence[StudyResults]) -> PanelFigure:
     rows = -(-2 * len(studies) // 4)
     shades = [shade_of(study.problem, study.response) for study in studies]
     shade = max(shades, key=lambda shade: shade.field.limits[1])  # one range of colours for all
-    letters = iter(ascii_lowercase)
+    letters = map(style.numbered_letter, count())
     panels = [
         panel
         for k, band in enumerate(bands)

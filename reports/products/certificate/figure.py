@@ -39,7 +39,7 @@ _TURN = 45.0
 """Between ticks of directions, where these span more, degrees."""
 _UNIT_TINT = "#c3c7cc"
 _MARKERS = "os^Dv"
-"""Of the loads in each set-up."""
+"""Of the loads in each set-up, over again after the last."""
 _TOP, _LOW, _HIGH, _HEIGHT = 11.0, 70.0, 36.0, 119.0
 
 
@@ -251,7 +251,8 @@ def _map(figure: Figure, axes: Axes, found: CertifiedDesign) -> None:
     own, across = found.own, found.axes[0]
     order = np.argsort(own["loss"].values)
     norm = Normalize(0.0, found.most)
-    for number, marker in zip(range(found.setups), _MARKERS, strict=False):
+    for number in range(found.setups):
+        marker = _MARKERS[number % len(_MARKERS)]
         of = order[own["load_setup"].values[order] == number]
         axes.scatter(
             own[f"load_{across}"][of], own["load_amplitude"][of], c=own["loss"][of],

@@ -78,6 +78,15 @@ def test_only_what_was_computed_is_called_so_and_all_is_told(synthetic: bool) ->
     assert sorted(highest) == [14.0, 16.0, 17.0, 19.0, 20.0]  # of ux and uy; not the load's 24 N
 
 
+def test_any_number_of_sets_is_drawn() -> None:
+    several = calibration().isel(set=[0] * 27, point=np.tile(np.arange(POINTS), 27))
+    several["set_of_point"] = ("point", np.repeat(np.arange(27), POINTS))
+    with style.styled():
+        said = words(draw_calibration(several))
+    assert {"a", "z", "aa", "ab"} <= said
+    assert "ac" not in said
+
+
 @pytest.mark.slow
 def test_files_are_whole_and_the_same_every_time(tmp_path: Path) -> None:
     origin = provenance.of_recording("{}", {}, synthetic=True, role="calibration")
