@@ -59,6 +59,7 @@ rule joint_report:
     threads: 1
     params:
         preset=lambda wildcards: wildcards.preset.replace("@", "--preset "),
+        figure=rule_inputs.figure_hash,
         folder=subpath(output.page, parent=True),
         problem=rule_inputs.member_hashes,
         source=source_hash(REPORTS["several-studies"].module),

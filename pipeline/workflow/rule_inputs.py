@@ -5,6 +5,7 @@ Both enter the rules as hashes: a rerun follows from what a file says, never fro
 heavy is imported here: this is the time one waits for "nothing to be done".
 """
 
+import hashlib
 import os
 import sys
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -21,13 +22,13 @@ from pipeline.problem import (
     over_measured_constants,
     section_hash,
 )
+from pipeline.problem.reading import joint_figure
 from pipeline.problem.sections import design_name, group_count, split_name
 from pipeline.problem.sections import designs as designs_section
 from pipeline.runtime import RUN_MARK, WORK, UserError
-from pipeline.workflow import study_lock
-from pipeline.workflow.live_runs import Run
 from pipeline.workflow.product_checks import check_products, presets_in_ranges, robust_presets
 from pipeline.workflow.recordings import recording_pages, shown_recordings
+from pipeline.workflow.runs import Run, study_lock
 from pipeline.workflow.studies import (
     Study,
     asked_for,
@@ -119,6 +120,16 @@ def structures_built(problem: Problem) -> tuple[str, ...]:
 def member_hashes(wildcards: Wildcards) -> str:
     """Hashes what the figure depends on in the problem files of its studies."""
     return hashes_of(together()[f"{wildcards.name}{wildcards.preset}"])
+
+
+def figure_hash(wildcards: Wildcards) -> str:
+    """Hashes what is told of a figure of several studies; a fault in it is told by its stage."""
+    path = WORK / "experiments" / wildcards.name / "figure.yaml"
+    try:
+        described = joint_figure.load_joint_figure(path).model_dump_json()
+    except UserError:
+        return ""
+    return hashlib.sha256(described.encode()).hexdigest()
 
 
 def check_problems(words: Collection[str]) -> None:

@@ -14,9 +14,8 @@ from typing import NoReturn
 import psutil
 
 from pipeline.runtime import INSTALLED, ROOT, RUN_MARK, WORK, UserError, streams
-from pipeline.workflow import stale_jobs, study_lock
-from pipeline.workflow.live_runs import Run
 from pipeline.workflow.rule_inputs import check_problems
+from pipeline.workflow.runs import Run, stale_jobs, study_lock
 
 _PATIENCE = 5.0  # seconds that a left-over job gets to end by itself
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)

@@ -13,7 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from pipeline.workflow.stale_jobs import PREFIX
+from pipeline.workflow.runs.stale_jobs import PREFIX
 from tests.e2e.checkout import Checkout, wait_until
 
 TARGET = "fig3@quick"

@@ -13,7 +13,7 @@ from pipeline.posing import failures
 from pipeline.problem.reading import load, overlay_keys
 from pipeline.runtime import ROOT, UserError
 from pipeline.tracking.reference_frame import recognition
-from pipeline.workflow import study_lock
+from pipeline.workflow.runs import study_lock
 from tests.docs.pages import PLACE, Block, blocks, text
 from tests.docs.walk import LAID_OVER, check_recording, checked
 

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 import yaml
+from snakemake.iocontainers import Wildcards
 
 from pipeline.workflow.product_checks import check_products
-from pipeline.workflow.rule_inputs import check_room, products
+from pipeline.workflow.rule_inputs import check_room, figure_hash, products
 from tests.tables import cases, refused, some
 from tests.workflow.conftest import Sandbox
 
@@ -48,6 +49,24 @@ def test_studies_from_nothing(sandbox: Sandbox) -> None:
     assert planned["report"] + 1 == len(figures)  # none of the variants
     assert planned["movie"] == 4
     assert sandbox.planned("index") == {"index": 1}
+
+
+def test_a_figure_of_several_is_drawn_again_for_its_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pipeline.workflow.rule_inputs.WORK", tmp_path)
+    figure = tmp_path / "experiments/fig6/figure.yaml"
+    (figure.parent.with_name("fig2")).mkdir(parents=True)
+    (figure.parent.with_name("fig2") / "problem.yaml").touch()
+    figure.parent.mkdir()
+    words = ("title: One\nstudies: [fig2]", "studies: [fig2] # as before\ntitle: One",
+             "title: Two\nstudies: [fig2]", "title: [")  # fmt: skip
+    hashes = [
+        figure_hash(Wildcards(fromdict={"name": "fig6"}))
+        for text in words
+        if figure.write_text(text)
+    ]
+    assert hashes[0] == hashes[1] != hashes[2] != hashes[3] == ""
 
 
 def test_products_have_rules_where_they_are_asked_for() -> None:

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.runtime import UserError
-from pipeline.workflow import stale_jobs
+from pipeline.workflow.runs import stale_jobs
 
 SQUEUE = "cat {queue}\n"
 SCANCEL = 'for number in "$@"; do sed -i "/^$number|/d" {queue}; done\n'

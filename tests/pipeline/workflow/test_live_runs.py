@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 from pipeline.runtime import RUN_MARK, UserError
-from pipeline.workflow import run, stale_jobs, study_lock
-from pipeline.workflow.live_runs import Run
+from pipeline.workflow import run
+from pipeline.workflow.runs import Run, stale_jobs, study_lock
 
 Begin = Callable[..., subprocess.Popen[bytes]]
 IDLE = "import time; time.sleep(60)"
 HOLDING = (
-    "import sys; from pipeline.workflow import study_lock; study_lock.hold(['results/fig2/a'])"
+    "import sys; from pipeline.workflow.runs import study_lock; study_lock.hold(['results/fig2/a'])"
 )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.runtime import UserError
-from pipeline.workflow import study_lock
+from pipeline.workflow.runs import study_lock
 
 
 def hold(monkeypatch: pytest.MonkeyPatch, folder: Path, number: int) -> None:

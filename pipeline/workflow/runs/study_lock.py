@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TextIO
 
 from pipeline.runtime import UserError, refusal
-from pipeline.workflow.live_runs import Run
+from pipeline.workflow.runs.live_runs import Run
 
 LOG = logging.getLogger(__name__)
 
