@@ -38,6 +38,7 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: a structure could not be followed to its end; what was computed is kept.
     """
+    _partial(args).unlink(missing_ok=True)  # of a run before this one
     asked = problem.load(args.problem, args.preset)
     asked = law_comparison.under(asked, "geometric") if args.geometric else asked
     if args.certificate is not None:
@@ -81,10 +82,16 @@ def _keep(
         made, plans = response_dataset(asked, shorter, args.threads)
     except StoppedError as again:
         return _keep(asked, shorter, again, args)
-    out: Path = args.out.with_name(f"{args.out.stem}_partial.nc")
+    out = _partial(args)
     origin = provenance.of_study(asked, "simulate", parents=_parents(args), plan=plans)
     datasets.write(made, out, "response", origin)
     return out
+
+
+def _partial(args: argparse.Namespace) -> Path:
+    """Names the file for a response that could not be followed to its end."""
+    out: Path = args.out
+    return out.with_name(f"{out.stem}_partial.nc")
 
 
 def _until(scene: Scene, steps: int) -> Scene:

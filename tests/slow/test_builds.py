@@ -68,7 +68,7 @@ def test_a_published_study_builds_itself_again(crate: Path, tmp_path: Path) -> N
     make(crate, "wheels", packages)
     make(crate, "setup", packages, **NOWHERE)
     make(crate, TARGET, **NOWHERE)
-    count, apart = differences(crate / "published", crate / "results" / TARGET)
+    count, apart = differences(crate / "published" / TARGET, crate / "results" / TARGET)
     assert count > 20
     assert apart == []
 

@@ -92,6 +92,7 @@ def test_nothing_is_kept_of_a_path_that_ends_at_once(
     hole: list[str], tmp_path: Path, stopping: Callable[[float], None], failing: Failing
 ) -> None:
     stopping(0.1)
+    (tmp_path / "r_partial.nc").write_text("of a run before this one")
     assert "look at unit [3, 2]" in failing("simulate", words(hole, tmp_path / "r.nc"))
     told = failing("design", [*hole, str(tmp_path / "d.nc"), "--method", "sqp"])
     assert "the initial structure cannot be simulated" in told

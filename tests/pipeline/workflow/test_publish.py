@@ -1,6 +1,8 @@
 import json
 import shutil
+import subprocess
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 import requests
@@ -8,9 +10,12 @@ import rocrate
 
 from pipeline import datasets
 from pipeline.datasets import provenance
-from pipeline.runtime import ROOT, UserError
+from pipeline.problem import outputs, section_hash
+from pipeline.runtime import REPORTED, ROOT, UserError
 from pipeline.workflow import publish
-from pipeline.workflow.studies import Study
+from pipeline.workflow.crates import BUILT, Publication, describe, leftovers, named_outside
+from pipeline.workflow.recordings import shown_recordings
+from pipeline.workflow.studies import Study, problem_of
 from tests.pipeline.samples import sample
 
 _CONTEXT = Path(rocrate.__file__).parent / "data/ro-crate.jsonld"
@@ -37,9 +42,10 @@ def crate(tmp_path_factory: pytest.TempPathFactory) -> Path:
         told |= {} if synthetic is None else {"synthetic": synthetic}
         datasets.write(sample(kind), built / f"{kind}.nc", kind, told)  # type: ignore[arg-type]
     folder = place / "crate"
-    publish.copy_sources(folder)
-    shutil.copytree(built, folder / publish.BUILT)
-    publish.describe(Study.parse("fig4@quick"), folder)
+    asked = Publication.of("fig4@quick")
+    publish.copy_sources(asked, folder)
+    shutil.copytree(built, folder / BUILT / asked.target)
+    describe(asked, folder)
     return folder
 
 
@@ -56,11 +62,90 @@ def test_it_holds_to_the_profile(crate: Path, monkeypatch: pytest.MonkeyPatch) -
     found = services.validate(settings).get_issues()
     assert [each.message for each in found] == []
     graph = json.loads((crate / "ro-crate-metadata.json").read_text())["@graph"]
-    origin = {each["@id"]: each.get("keywords") for each in graph}
-    assert origin["published/track.nc"] == "synthetic"
-    assert origin["published/population.nc"] == "measured"
-    assert origin["published/response.nc"] == "simulated"
-    assert "experiments/validation/escapement/LICENSE" in origin
+    origin = {unquote(each["@id"]): each.get("keywords") for each in graph}
+    assert origin["published/fig4@quick/track.nc"] == "synthetic"
+    assert origin["published/fig4@quick/population.nc"] == "measured"
+    assert origin["published/fig4@quick/response.nc"] == "simulated"
+
+
+def test_it_holds_the_files_of_no_other_study(crate: Path) -> None:
+    held = {path.relative_to(crate / "experiments").as_posix() for path in crate.rglob("*.*")
+            if path.is_relative_to(crate / "experiments")}  # fmt: skip
+    assert held == {
+        *("problem.schema.json", "fig4/problem.yaml", "fig4/recordings/altered.yaml"),
+        *("fig4/recordings/cloaked.yaml", "validation/constants.csv", "validation/README.md"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("word", "folders"),
+    [
+        ("fig2_edge3", ["fig2@edge3"]),
+        ("fig3@quick", ["fig3@quick", "fig3@quick.1", "fig3@quick.2"]),
+        ("fig6", ["fig6", "fig6_heart", "fig6_shamrock"]),
+    ],
+)
+def test_a_target_has_the_folders_of_all_that_it_builds(word: str, folders: list[str]) -> None:
+    asked = Publication.of(word)
+    assert asked.folders == folders
+    assert all((ROOT / name).is_file() for name in asked.inputs)
+    assert asked.about[0].endswith(f"({asked.target})")
+
+
+def test_a_file_from_outside_the_experiments_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = Study("fig4")
+    named = problem_of(study).report
+    assert named.measured_constants
+    moved = named.measured_constants.model_copy(update={"file": "../../docs/constants.csv"})
+    report = named.model_copy(update={"measured_constants": moved})
+    posed = problem_of(study).model_copy(update={"report": report})
+    monkeypatch.setattr("pipeline.workflow.studies.problem_of", lambda _: posed)
+    with pytest.raises(UserError, match="outside experiments") as told:
+        named_outside(study)
+    assert told.value.key == "report.measured_constants.file"
+    assert told.value.value == "docs/constants.csv"
+
+
+def test_what_is_not_of_the_problem_is_left_out_or_refused(tmp_path: Path) -> None:
+    """A method was dropped, the sweep is no more; what the report shows has to be of today."""
+    study = Study("fig6_heart", "quick")
+    asked = problem_of(study)
+    assert "sweep" not in outputs(asked)
+    assert not shown_recordings(str(study))
+
+    def write(name: str, kind: str, stage: str) -> None:
+        told = {"git_commit": "", "problem_hash": section_hash(asked, stage)}
+        datasets.write(sample(kind), tmp_path / f"{name}.nc", kind, told)  # type: ignore[arg-type]
+
+    for name in outputs(asked):
+        write(name, str(REPORTED[name].kind), REPORTED[name].name)
+    assert leftovers(study, tmp_path) == []
+    for left_over, kind in (("design_mma", "design_method"), ("sweep", "sweep")):
+        write(left_over, kind, "fabricate")
+    write("response_partial", "response", "simulate")
+    (tmp_path / "sweep").mkdir()
+    left = [path.name for path in leftovers(study, tmp_path)]
+    assert left == ["design_mma.nc", "response_partial.nc", "sweep.nc", "sweep"]
+    write("response", "response", "design")
+    with pytest.raises(UserError, match="another problem than the study's") as told:
+        leftovers(study, tmp_path)
+    assert told.value.key == "problem_hash"
+
+
+def test_sources_that_are_not_as_committed_are_refused(tmp_path: Path) -> None:
+    for name in ("sim/a.py", "experiments/mine/problem.yaml"):
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).touch()
+    publish.check_sources(tmp_path)  # which has no history
+    words = ["git", "-C", str(tmp_path), "-c", "user.name=T", "-c", "user.email=t@localhost"]
+    subprocess.run([*words, "init", "--quiet"], check=True)
+    subprocess.run([*words, "add", "sim"], check=True)
+    subprocess.run([*words, "commit", "--quiet", "--message", "One"], check=True)
+    publish.check_sources(tmp_path)
+    (tmp_path / "sim/a.py").write_text("changed")
+    with pytest.raises(UserError, match="not as committed") as told:
+        publish.check_sources(tmp_path)
+    assert told.value.file == str(tmp_path / "sim/a.py")
 
 
 def test_its_sources_name_the_commit(crate: Path, monkeypatch: pytest.MonkeyPatch) -> None:
