@@ -13,6 +13,10 @@ PYTEST ?= -n auto --dist loadscope --no-loadscope-reorder --ignore tests/clients
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
+# Programs of an environment begin with its folder: in one that was moved they do not start.
+MOVED := $(shell [ -L .venv ] || [ ! -e .venv/bin/pip ] || head -n 2 .venv/bin/pip | grep -qF "$$(pwd -P)/.venv/" || echo yes)
+$(if $(MOVED),$(warning .venv was made in another folder, its programs may not start: rm -r .venv, then make setup))
+
 # By the environment: names of folders never are words of a shell's command.
 export TARGET = $@
 

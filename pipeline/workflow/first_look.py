@@ -4,6 +4,7 @@ import argparse
 import subprocess
 import sys
 from collections.abc import Iterable
+from pathlib import Path
 
 from pipeline.runtime import PREFIX, WORK
 from pipeline.workflow.studies import Study, check_names
@@ -17,16 +18,19 @@ def work(args: argparse.Namespace) -> None:
     """
     study = Study.parse(args.study)
     check_names(study)
-    sys.exit(_show(study))
+    sys.exit(_show(study, WORK))
 
 
 def show(names: Iterable[str]) -> None:
-    """Shows studies, named as their folders of results are; a fault is told by their stages."""
+    """Shows studies, named as their folders of results are; a fault is told by their stages.
+
+    The pictures go to the folder in which the workflow runs, as all that it makes.
+    """
     for name in sorted(set(names)):
-        _show(Study.parse(name))
+        _show(Study.parse(name), Path.cwd())
 
 
-def _show(study: Study) -> int:
+def _show(study: Study, folder: Path) -> int:
     command = [sys.executable, "-m", f"{PREFIX}reports", "check", *study.options.split()]
-    shown = subprocess.run([*command, "--out-dir", f"results/{study}"], cwd=WORK, check=False)
+    shown = subprocess.run([*command, "--out-dir", f"results/{study}"], cwd=folder, check=False)
     return shown.returncode

@@ -5,13 +5,14 @@ Both builds have a results folder of their own in a temporary place, and these s
 
 import argparse
 import logging
+import shutil
 import subprocess
-import sys
+import tempfile
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from pipeline.datasets import file_hash
-from pipeline.runtime import ROOT, UserError
+from pipeline.runtime import INSTALLED, ROOT, UserError
+from pipeline.workflow.runs import SNAKEMAKE
 
 LOG = logging.getLogger(__name__)
 
@@ -41,24 +42,29 @@ def _built(target: str, folder: Path) -> Path:
     folder.mkdir()
     for name in SOURCES:
         (folder / name).symlink_to(ROOT / name)
-    snakemake = str(Path(sys.executable).with_name("snakemake"))
-    ended = subprocess.run([snakemake, target], cwd=folder, check=False)
+    ended = subprocess.run([*SNAKEMAKE, target], cwd=folder, check=False)
     if ended.returncode != 0:
-        raise UserError("the build failed", key=target, remedy=f"see why: snakemake {target}")
+        remedy = f"see its logs there, or why: snakemake {target}"
+        raise UserError("the build failed", file=folder, key=target, remedy=remedy)
     return folder / "results"
 
 
 def work(args: argparse.Namespace) -> None:
-    """Builds twice and compares.
+    """Builds twice and compares; both builds stay where they fail or differ.
 
     Raises:
-        UserError: a build fails, or files differ.
+        UserError: a build fails, files differ, or there is no checkout.
     """
-    with TemporaryDirectory(prefix="reproduce_") as place:
-        first, second = (_built(args.target, Path(place) / name) for name in ("first", "second"))
-        count, apart = differences(first, second)
+    if INSTALLED:
+        what = "what is built twice are the studies of a checkout, which an installed package lacks"
+        raise UserError(what, remedy="clone the repository, and there: make reproduce STUDY=name")
+    place = Path(tempfile.mkdtemp(prefix="reproduce_"))
+    LOG.info("building twice in %s, which stays if that fails", place)
+    first, second = (_built(args.target, place / name) for name in ("first", "second"))
+    count, apart = differences(first, second)
     if apart:
         what = f"{len(apart)} of {count} files differ between two builds: {', '.join(apart)}"
         remedy = "tell the developers, with this list and the versions in requirements.lock"
-        raise UserError(what, key=args.target, remedy=remedy)
+        raise UserError(what, file=place, key=args.target, remedy=remedy)
+    shutil.rmtree(place)
     LOG.info("%s: two builds have the same bytes (files compared: %d)", args.target, count)

@@ -8,14 +8,13 @@ import ctypes
 import os
 import signal
 import sys
-from pathlib import Path
 from typing import NoReturn
 
 import psutil
 
 from pipeline.runtime import INSTALLED, ROOT, RUN_MARK, WORK, UserError, streams
 from pipeline.workflow.rule_inputs import check_problems
-from pipeline.workflow.runs import Run, stale_jobs, study_lock
+from pipeline.workflow.runs import SNAKEMAKE, Run, stale_jobs, study_lock
 
 _PATIENCE = 5.0  # seconds that a left-over job gets to end by itself
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
@@ -31,8 +30,7 @@ def work(arguments: list[str]) -> NoReturn:
     except UserError as error:
         sys.exit(f"error: {error}")
     _end_with_make()
-    snakemake = str(Path(sys.executable).with_name("snakemake"))
-    os.execv(snakemake, [snakemake, *_places(), *arguments])
+    os.execv(sys.executable, [*SNAKEMAKE, *_places(), *arguments])
 
 
 def _places() -> list[str]:

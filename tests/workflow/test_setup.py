@@ -109,6 +109,19 @@ def test_pip_installs_where_uv_fails(folder: Path) -> None:
     subprocess.run([folder / ".venv/bin/python", "-c", "import other"], check=True)
 
 
+@pytest.mark.parametrize("made_in", ["here", "elsewhere"])
+def test_an_environment_that_was_moved_is_told(tmp_path: Path, made_in: str) -> None:
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    pip = tmp_path / ".venv/bin/pip"
+    pip.parent.mkdir(parents=True)
+    folder = tmp_path if made_in == "here" else tmp_path.with_name("other")
+    pip.write_text(f'#!/bin/sh\n\'\'\'exec\' "{folder}/.venv/bin/python" "$0" "$@"\n')
+    ended = subprocess.run(
+        ["make", "help"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert ("made in another folder" in ended.stderr) is (made_in == "elsewhere")
+
+
 @cases("workflow", "listed, settings")
 def test_settings_of_pip_become_those_of_uv(listed: str, settings: dict[str, str]) -> None:
     assert uv_settings(listed) == settings

@@ -1,3 +1,4 @@
 from . import stale_jobs as stale_jobs
 from . import study_lock as study_lock
+from .live_runs import SNAKEMAKE as SNAKEMAKE
 from .live_runs import Run as Run

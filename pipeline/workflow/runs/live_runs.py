@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import os
 import socket
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
 import psutil
+
+SNAKEMAKE = (sys.executable, "-m", "snakemake")
+"""Begins the command of a run; a script of an environment that was moved does not start."""
 
 
 class Run(NamedTuple):

@@ -35,6 +35,17 @@ def begin() -> Iterator[Begin]:
         process.wait()
 
 
+def test_a_run_needs_no_script_of_its_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which begins with the folder that the environment was made in."""
+    begun: list[list[str]] = []
+    for name in ("check_problems", "_clear_the_ground", "_end_with_make"):
+        monkeypatch.setattr(run, name, lambda *_: None)
+    monkeypatch.setattr("pipeline.runtime.streams.complete", lambda: None)
+    monkeypatch.setattr(os, "execv", lambda _, words: begun.append(words))
+    run.work(["fig2"])
+    assert begun == [[sys.executable, "-m", "snakemake", "fig2"]]
+
+
 def test_jobs_end_whose_run_has_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, begin: Begin
 ) -> None:

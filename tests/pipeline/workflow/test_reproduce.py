@@ -1,11 +1,13 @@
 """What counts as the same results, and how a build that fails is told."""
 
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from pipeline.__main__ import run_stage
-from pipeline.workflow import reproduce
+from pipeline.workflow import first_look, reproduce
 from tests.pipeline.conftest import Failing
 
 
@@ -31,15 +33,60 @@ def build(text: str) -> object:
     return lambda _target, folder: written(folder / "results", design=text or next(texts))
 
 
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder for temporary files."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    return tmp_path
+
+
 def test_two_builds_are_compared(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], failing: Failing
+    place: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    failing: Failing,
 ) -> None:
     monkeypatch.setattr(reproduce, "SOURCES", ())
-    assert "the build failed" in failing("reproduce", ["fig2@quick"])
+    told = failing("reproduce", ["fig2@quick"])
+    assert "the build failed" in told
+    (kept,) = place.glob("reproduce_*")
+    assert str(kept / "first") in told
+    shutil.rmtree(kept)
     monkeypatch.setattr(reproduce, "_built", build(""))
     told = failing("reproduce", ["fig2@quick"])
     assert "1 of 1 files differ between two builds: design" in told
+    (kept,) = place.glob("reproduce_*")
+    assert str(kept) in told
+    assert (kept / "second/results/design").read_text() == "second"
+    shutil.rmtree(kept)
     monkeypatch.setattr(reproduce, "_built", build("same"))
     assert run_stage("reproduce", ["fig2@quick"]) == 0
     equal = "fig2@quick: two builds have the same bytes (files compared: 1)"
     assert equal in capfd.readouterr().err
+    assert not list(place.glob("reproduce_*"))
+
+
+def test_a_build_elsewhere_leaves_no_picture_in_the_results(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of its first look, which goes where the workflow runs."""
+    folders = []
+
+    def show(_: object, cwd: Path, check: bool) -> subprocess.CompletedProcess[str]:
+        folders.append(cwd)
+        return subprocess.CompletedProcess([], int(check))
+
+    monkeypatch.setattr(subprocess, "run", show)
+    monkeypatch.chdir(place)
+    first_look.show(["fig2@quick"])
+    assert folders == [place]
+
+
+@pytest.mark.parametrize("stage", ["reproduce", "publish"])
+def test_an_installed_package_has_no_sources_to_build_from(
+    monkeypatch: pytest.MonkeyPatch, failing: Failing, stage: str
+) -> None:
+    monkeypatch.setattr(f"pipeline.workflow.{stage}.INSTALLED", True)
+    told = failing(stage, ["fig2@quick"])
+    assert "of a checkout, which an installed package lacks" in told
+    assert f"make {stage} STUDY=" in told
