@@ -15,10 +15,10 @@ wildcard_constraints:
 
 
 onstart:
-    rule_inputs.check_room("results")
-    rule_inputs.hold_studies(
-        file for job in workflow.dag.needrun_jobs() for file in job.output
-    )
+    made = [file for job in workflow.dag.needrun_jobs() for file in job.output]
+    if made:  # and not only removed
+        rule_inputs.check_room("results")
+    rule_inputs.hold_studies(made)
     if not workflow.non_local_exec:
         stage_server.start()
     first_look.show(

@@ -1,8 +1,8 @@
 """Hashes the source files that decide what a stage does, found through its import statements.
 
 Snakemake does not see an edit in an imported module; a hash of these files among a rule's params
-makes it see. They are kept in .cache/ beside a hash of the whole source tree, as following imports
-takes half as long as all else that Snakemake does before it finds nothing to be done.
+makes it see. They are kept among the caches beside a hash of the whole source tree, as following
+imports takes half as long as all else that Snakemake does before it finds nothing to be done.
 """
 
 import hashlib
@@ -13,7 +13,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-from pipeline.runtime.locations import ROOT
+from pipeline.runtime.locations import CACHE, ROOT
 from sim.core import PACKAGES, import_closure, locate
 
 RESOURCES = {".css", ".csv", ".html", ".j2", ".js", ".json", ".mplstyle", ".svg", ".toml", ".yaml"}
@@ -22,7 +22,7 @@ RESOURCES = {".css", ".csv", ".html", ".j2", ".js", ".json", ".mplstyle", ".svg"
 @cache
 def source_hash(module: str, root: Path = ROOT) -> str:
     """Hashes the source of a module and of everything of this project that it imports."""
-    store = root / ".cache/source_hashes.json"
+    store = (CACHE if root == ROOT else root / ".cache") / "source_hashes.json"
     known = _kept_hashes(store, _tree_hash(root))
     if module not in known:
         known[module] = _digest(source_files(module, root), root)
@@ -50,7 +50,7 @@ def _kept_hashes(store: Path, tree: str) -> dict[str, str]:
 def _keep(store: Path, hashes: dict[str, object]) -> None:
     aside = store.with_name(f".part_{os.getpid()}_{store.name}")
     with suppress(OSError):  # a folder that is read-only: they are computed each time
-        store.parent.mkdir(exist_ok=True)
+        store.parent.mkdir(parents=True, exist_ok=True)
         aside.write_text(json.dumps(hashes), encoding="utf-8")
         aside.replace(store)
 

@@ -301,3 +301,11 @@ def test_files_beside_a_recording_may_have_spaces(built: Sandbox) -> None:
     assert ended.returncode == 0, ended.stdout + ended.stderr
     told = (built.root / "results/fig2/recordings/run1/track.nc").read_text()
     assert names[1] in told
+
+
+def test_results_are_removed_where_none_can_be_written(sandbox: Sandbox) -> None:
+    results = sandbox.root / "results"
+    results.symlink_to("nowhere")  # no folder can be made, as on a full disk
+    ended = sandbox.run("clean")
+    assert ended.returncode == 0, ended.stderr
+    assert not results.is_symlink()

@@ -52,6 +52,17 @@ def forget() -> None:
         known.cache_clear()
 
 
+def test_hashes_of_an_installed_package_are_among_the_users_caches(
+    tree: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    forget()
+    monkeypatch.setattr(source_closure, "ROOT", tree)
+    monkeypatch.setattr(source_closure, "CACHE", tmp_path / "user/metacloak")
+    assert source_hash("pipeline.stage", tree)
+    assert (tmp_path / "user/metacloak/source_hashes.json").is_file()
+    assert not (tree / ".cache").exists()
+
+
 def test_imports_are_followed_once_for_a_tree(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before, store = source_hash("pipeline.stage", tree), tree / ".cache/source_hashes.json"
     forget()
