@@ -128,12 +128,13 @@ def test_null_removes_a_key() -> None:
 def test_null_turns_off_what_is_on_by_default(fig2: Path, tmp_path: Path) -> None:
     """In the file and in a preset; and what is off stays so in the problem that a file holds."""
     content = yaml.safe_load(fig2.read_bytes())
-    off = {"robustness": {"together": None}, "fabrication": {"shims": {"tabs": None}}}
+    alone = {"together": None, "geometry": [0.03]}
+    off = {"robustness": alone, "fabrication": {"shims": {"tabs": None}}}
     path = tmp_path / "problem.yaml"
     path.write_text(yaml.safe_dump(content | {"presets": {"off": off}}))
     on, overlaid = load(path), load(path, "off")
     del content["presets"]
-    content["robustness"]["together"] = None
+    content["robustness"] |= alone
     path.write_text(yaml.safe_dump(content | {"fabrication": off["fabrication"]}))
     assert load(path) == overlaid
     assert on.robustness is not None
