@@ -31,6 +31,7 @@ from .start_design import closest_vector as closest_vector
 from .start_design import start_vector as start_vector
 from .structure_variables import CLAMPED as CLAMPED
 from .structure_variables import DRIVEN as DRIVEN
+from .structure_variables import FEASIBLE as FEASIBLE
 from .structure_variables import Variables as Variables
 from .structure_variables import design_hash as design_hash
 from .structure_variables import designed_angles as designed_angles

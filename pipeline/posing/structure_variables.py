@@ -23,6 +23,8 @@ Variables = dict[str, tuple[Any, ...]]
 SURROUNDINGS, CLOAK, SOURCE, VOID, INCLUSION = range(5)
 FREE, CLAMPED, DRIVEN = range(3)
 
+FEASIBLE = 1e-6
+"""Violation of a constraint (mm, rad) up to which a design counts as feasible."""
 _ALIKE = 1e-6  # mm
 
 

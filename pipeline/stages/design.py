@@ -236,6 +236,8 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
     slots = np.full((intact.n_ligaments, 2), np.nan)
     if angles is not None:
         slots[np.isin(intact.id[intact.ligament_units], lattice.id).all(axis=1)] = angles
+    violation = np.array([e.violation for e in history])
+    violation[result.best] = result.violation  # as confirmed
     cases = len(case_directions(asked))
     nothing = np.full(cases, np.nan)
 
@@ -256,7 +258,7 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
             ("evaluation", "case"),
             np.stack([nothing if e.failure else e.aux[:cases] for e in history]),
         ),
-        "violation": (("evaluation",), [e.violation for e in history]),
+        "violation": (("evaluation",), violation),
         "accepted": (("evaluation",), [int(e.accepted) for e in history]),
         "design_vector": (("evaluation", "variable"), np.stack([e.x for e in history])),
         "best_evaluation": ((), result.best),

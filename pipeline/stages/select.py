@@ -1,4 +1,4 @@
-"""Stage: ships the better feasible design of several methods, with all their histories."""
+"""Stage: ships the better design of several methods, a feasible one first, with all histories."""
 
 import argparse
 import json
@@ -8,6 +8,7 @@ import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
+from pipeline.posing import FEASIBLE
 from pipeline.runtime import UserError
 
 LOG = logging.getLogger(__name__)
@@ -34,6 +35,8 @@ def work(args: argparse.Namespace) -> None:
     best = min(designs, key=lambda method: _merit(designs[method]))
     if overlaps := int(designs[best]["overlaps"]):
         LOG.warning("%d pairs of units overlap in the shipped design", overlaps)
+    if missed := _missed(designs[best]):
+        LOG.warning("the shipped design misses a constraint by %.2g (mm, or rad)", missed)
     for method, design in designs.items():
         LOG.info("%s: loss %.5g", method, float(design["best_loss"]))
     LOG.info("shipped: the design by %s", best)
@@ -44,9 +47,15 @@ def work(args: argparse.Namespace) -> None:
     datasets.write(join(designs, best), args.out, "design", origin)
 
 
-def _merit(design: xr.Dataset) -> tuple[int, float]:
-    """Overlapping pairs, found by geometry apart from the constraints, then the loss."""
-    return int(design["overlaps"]), float(design["best_loss"])
+def _merit(design: xr.Dataset) -> tuple[int, float, float]:
+    """Overlapping pairs, found by geometry apart from the constraints; what it misses; the loss."""
+    return int(design["overlaps"]), _missed(design), float(design["best_loss"])
+
+
+def _missed(design: xr.Dataset) -> float:
+    """Reads by how much a design misses a constraint, zero if it counts as feasible."""
+    missed = float(design["violation"].isel(evaluation=int(design["best_evaluation"])))
+    return missed if missed > FEASIBLE else 0.0
 
 
 def join(designs: dict[str, xr.Dataset], best: str) -> xr.Dataset:

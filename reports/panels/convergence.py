@@ -10,10 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 
+from pipeline.posing import FEASIBLE
 from reports.base import style
-
-FEASIBLE = 1e-6
-"""Violation of a constraint (mm, rad) up to which an evaluation counts as feasible."""
 
 SIDES: tuple[tuple[tuple[float, float], dict[str, Any]], ...] = (
     ((0, -4.5), {"ha": "right", "va": "top"}),
