@@ -91,7 +91,8 @@ class ConstraintLimits(Section):
         void_angle: between the edges of neighbouring units, at either side of a ligament.
         gap: between two units.
         convex: whether units must be convex.
-        shim_strain: largest strain of the shims' foil, under all loads of the loss; of
+        shim_strain: largest strain of the shims' foil, in the perfect structure under the drive's
+            own loads and those of `objective.robust`, not under loads in ranges; of
             `material.foil`, or of foil as thick as `fabrication.shims.thickness`.
         straight_shims: whether units must have room for slots along their ligaments (of
             `fabrication.slots`), so that no shim is bent before any load; for convex units.

@@ -76,7 +76,8 @@ class _Ranges(Section):
 class TestSetup(_Ranges):
     """Another set-up of the structure, with loads of its own in ranges.
 
-    Amplitudes and frequencies that are left out are those of the loads in the study's set-up.
+    Ranges of amplitudes and frequencies that are left out are those of the loads in the study's
+    set-up; where these give none, its own drive's values.
 
     Attributes:
         supports: in it; none by default.
