@@ -76,9 +76,8 @@ def read_experiment(asked: MeasurementSet, begin: Constants, path: Path) -> Expe
         )
     folder = path.parent
     if isinstance(asked, ForceDisplacement):
-        return force_displacement.pose_force_test(
-            asked, begin, *force_displacement.read(asked, folder, tare=asked.tare)
-        )
+        readings = force_displacement.read(asked, asked.lattice, folder, tare=asked.tare)
+        return force_displacement.pose_force_test(asked, begin, *readings)
     if isinstance(asked, FreeDecay):
         return free_decay.pose_decay(asked, *free_decay.read(asked, folder))
     return full_field.pose_track(asked, folder, begin, tracked_specimen.read_track(asked, folder))

@@ -24,6 +24,7 @@ from pipeline.calibration.inputs import (
 from pipeline.problem.fields import csv_columns, units
 from pipeline.problem.sections import Lattice as Specimen
 from pipeline.runtime import UserError
+from pipeline.tracking.output import grip_displacement
 from sim.core import Floats, Ints, Numbers
 from sim.energy import topology
 from sim.quasistatics import StaticSolver
@@ -49,11 +50,14 @@ class ForceFile(Protocol):
     def record(self) -> RecordOptions | None: ...  # noqa: D102
 
 
-def read(asked: ForceFile, folder: Path, *, tare: bool = False) -> tuple[Floats, Floats]:
+def read(
+    asked: ForceFile, specimen: Specimen, folder: Path, *, tare: bool = False
+) -> tuple[Floats, Floats]:
     """Reads displacements in mm and forces in N from the file of a set.
 
     Args:
         asked: the set.
+        specimen: that it is of.
         folder: from which its file is named.
         tare: whether the load cell's zero is unknown, as the least displacement tells it then.
 
@@ -63,7 +67,7 @@ def read(asked: ForceFile, folder: Path, *, tare: bool = False) -> tuple[Floats,
     assert asked.file is not None
     path = folder / asked.file
     if path.suffix == ".nc":
-        displacement, force = _read_track(path, asked.test)
+        displacement, force = _read_track(path, specimen, asked.test)
     else:
         wanted = {asked.columns.displacement: units.LENGTH, asked.columns.force: units.FORCE}
         displacement, force = csv_columns.read_quantities(path, wanted, LEAST_LINES).T
@@ -99,15 +103,21 @@ def _check_signs(asked: ForceFile, path: Path, displacement: Floats, force: Floa
         )
 
 
-def _read_track(path: Path, test: TestKind) -> tuple[Floats, Floats]:
+def _read_track(path: Path, specimen: Specimen, test: TestKind) -> tuple[Floats, Floats]:
     """Reads how far the top row of a filmed specimen went from the bottom row, and the force."""
     track = datasets.read(path, "track")
+    if track.sizes["unit"] != specimen.n_units:
+        what = f"the track is of {track.sizes['unit']} units, the lattice of {specimen.n_units}"
+        remedy = "describe in lattice the specimen that was filmed"
+        raise UserError(what, file=path, key="unit", remedy=remedy)
     if not np.isfinite(track["load_force"]).any():
         remedy = "give load_cell in the recording's YAML, and track it again"
         raise UserError("the track has no forces", file=path, key="load_force", remedy=remedy)
-    rows = [track["displacement"].where(track["j"] == end) for end in (track["j"].max(), 0)]
-    top, bottom = (each.mean("unit").sel(dof=["ux", "uy"]) for each in rows)
-    way = (top - bottom).transpose("time", "dof").values @ DIRECTIONS[test]
+    moved = track["displacement"].transpose("time", "unit", "dof").values
+    site = np.array([place for _, *place in specimen.sites()])
+    rows = (list(specimen.side(name)) for name in ("top", "bottom"))
+    top, bottom = (grip_displacement(moved[:, row], site[row]) for row in rows)
+    way = (top - bottom) @ DIRECTIONS[test]
     seen = np.isfinite(way) & np.isfinite(track["load_force"].values)
     return way[seen], track["load_force"].values[seen]
 

@@ -10,6 +10,7 @@ from pipeline.calibration.experiments import force_displacement
 from pipeline.calibration.inputs import SampleTest, TestKind
 from pipeline.calibration.population.curve_emulator import CurveEmulator
 from pipeline.calibration.population.hierarchical_model import Readings
+from pipeline.problem.sections import Lattice
 from pipeline.runtime import UserError
 from sim.core import Floats
 
@@ -44,13 +45,13 @@ class SampleCurve(NamedTuple):
         return self._replace(displacement=displacement, force=force)
 
 
-def read_curve(asked: SampleTest, folder: Path) -> SampleCurve:
-    """Reads the curve of a set.
+def read_curve(asked: SampleTest, specimen: Lattice, folder: Path) -> SampleCurve:
+    """Reads the curve of a set, which is of a specimen.
 
     Raises:
         UserError: the file cannot be used, or holds no force above zero at its end.
     """
-    displacement, force = force_displacement.read(asked, folder)
+    displacement, force = force_displacement.read(asked, specimen, folder)
     curve = SampleCurve(asked.name, asked.test, asked.samples, displacement, force)
     late = displacement > displacement.max() / 4
     if not (force[late] > 0).all():

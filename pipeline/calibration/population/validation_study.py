@@ -90,7 +90,7 @@ def validate_population(asked: Population, folder: Path) -> xr.Dataset:
     random = np.random.default_rng(0)
     begin = Constants(asked.material, None, asked.spacing)
     curves, emulators = _emulated(asked, folder, begin)
-    measured = read_curve(asked.predict, folder)
+    measured = read_curve(asked.predict, asked.predict.lattice, folder)
     end = float(measured.displacement.max())
     predicted = emulate(asked.predict.lattice, asked.predict.test, begin, end)
     readings, names = stack_readings(curves, emulators, asked.samples, asked.points)
@@ -173,7 +173,7 @@ def _new_samples(draws: Draws) -> Floats:
 def _emulated(
     asked: Population, folder: Path, begin: Constants
 ) -> tuple[list[SampleCurve], dict[TestKind, CurveEmulator]]:
-    curves = [read_curve(each, folder) for each in asked.data]
+    curves = [read_curve(each, asked.lattice, folder) for each in asked.data]
     return curves, {
         kind: emulate(asked.lattice, kind, begin, far) for kind, far in ends(curves).items()
     }

@@ -74,15 +74,21 @@ def driven_units(design: xr.Dataset) -> Mask:
 
 
 def drive_displacement(displacement: Floats, design: xr.Dataset) -> Floats:
-    """Averages displacements (frames, units, 3) over the driven units: (frames, 2), NaN without.
-
-    Where some were lost they are placed by the rigid motion of those that are seen: the mean over
-    these alone would jump, as a grip is never quite straight.
-    """
+    """Averages displacements (frames, units, 3) over the driven units: (frames, 2), NaN without."""
     driven = driven_units(design)
     start = design["vertices"].mean("vertex").transpose("unit", "xy").values[driven]
-    moved = displacement[:, driven, :2] @ [1.0, 1j]
-    place = start @ [1.0, 1j]
+    return grip_displacement(displacement[:, driven], start)
+
+
+def grip_displacement(displacement: Floats, start: Floats) -> Floats:
+    """Averages displacements (frames, units, 3) of what a grip holds: (frames, 2), NaN without.
+
+    Where some were lost they are placed by the rigid motion of those that are seen: the mean over
+    these alone would jump, as a grip is never quite straight. At rest they are at `start`
+    (units, 2), mm.
+    """
+    moved = displacement[..., :2] @ [1.0, 1j]
+    place = start @ np.array([1.0, 1j])
     mean = np.array([_mean_of_rigid(each, place) for each in moved])
     return np.stack([mean.real, mean.imag], axis=-1)
 

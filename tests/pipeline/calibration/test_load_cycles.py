@@ -13,8 +13,9 @@ from pipeline.calibration import load_cycle_study, study_cycles
 from pipeline.calibration.experiments import force_displacement, load_cycles
 from pipeline.calibration.inputs import ForceDisplacement, LoadCycles, RecordOptions, SampleTest
 from pipeline.calibration.load_cycle_study import follow_cycle, measure_cycle
-from pipeline.problem.fields import csv_columns
+from pipeline.problem.fields import SIM_UNITS, csv_columns
 from pipeline.problem.reading import load_section, overlay_keys
+from pipeline.problem.sections import ListedNetwork
 from pipeline.runtime import ROOT, UserError
 from sim.energy import observe
 from sim.quasistatics import EquilibriumTrace, StaticRecord, StaticSolver, trace, trace_first_snap
@@ -111,7 +112,7 @@ def test_zeros_of_the_machine_are_taken_from_the_start() -> None:
 def test_a_machines_file_is_read_with_its_units_below_the_names() -> None:
     record = {"drop_first": True, "zero": "start"}
     asked = {"columns": {"displacement": "Extension", "force": "Load"}, "record": record}
-    way, force = force_displacement.read(asked_of(INSTRON.name, **asked), INSTRON.parent)
+    way, force = read(asked_of(INSTRON.name, **asked), INSTRON.parent)
     np.testing.assert_allclose(force, 3.0 * way, atol=1e-3)
 
 
@@ -120,13 +121,17 @@ def asked_of(file: str, **more: object) -> ForceDisplacement:
     return ForceDisplacement.model_validate(given | {"file": file} | more)
 
 
+def read(asked: ForceDisplacement, folder: Path, **more: bool) -> tuple[np.ndarray, np.ndarray]:
+    return force_displacement.read(asked, asked.lattice, folder, **more)
+
+
 def test_a_test_in_the_other_direction_is_refused(tmp_path: Path) -> None:
     lines = "\n".join(f"{-k},{-2 * k}" for k in range(20))
     (tmp_path / "one.csv").write_text(f"displacement (mm),force (N)\n{lines}\n")
     with refused("nowhere above zero", "displacement", "reversed: both"):
-        force_displacement.read(asked_of("one.csv"), tmp_path)
+        read(asked_of("one.csv"), tmp_path)
     record = {"record": {"reversed": "both"}}
-    way, force = force_displacement.read(asked_of("one.csv", **record), tmp_path)
+    way, force = read(asked_of("one.csv", **record), tmp_path)
     np.testing.assert_array_equal([way, force], [np.arange(20), 2 * np.arange(20)])
 
 
@@ -135,19 +140,19 @@ def test_a_force_against_the_test_is_refused(tare: bool, tmp_path: Path) -> None
     lines = "\n".join(f"{k},{tare * 90 - 2 * k}" for k in range(20))
     (tmp_path / "one.csv").write_text(f"displacement (mm),force (N)\n{lines}\n")
     with refused("not above zero", "force", "reversed: force", file=tmp_path / "one.csv"):
-        force_displacement.read(asked_of("one.csv"), tmp_path, tare=tare)
+        read(asked_of("one.csv"), tmp_path, tare=tare)
     turned = asked_of("one.csv", record={"reversed": "force"})
-    _, force = force_displacement.read(turned, tmp_path, tare=tare)
+    _, force = read(turned, tmp_path, tare=tare)
     assert force[-1] > force[0]
 
 
 def test_an_offset_of_the_load_cell_is_no_force_against_the_test(tmp_path: Path) -> None:
     lines = "\n".join(f"{k},{2 * k - 90}" for k in range(20))
     (tmp_path / "one.csv").write_text(f"displacement (mm),force (N)\n{lines}\n")
-    _, force = force_displacement.read(asked_of("one.csv"), tmp_path, tare=True)
+    _, force = read(asked_of("one.csv"), tmp_path, tare=True)
     np.testing.assert_array_equal(force, 2 * np.arange(20) - 90)
     with refused("not above zero", "force", "zero: start"):
-        force_displacement.read(asked_of("one.csv"), tmp_path)
+        read(asked_of("one.csv"), tmp_path)
 
 
 @pytest.mark.parametrize("turned", ["displacement", "both"])
@@ -162,23 +167,53 @@ def test_the_displacement_of_a_track_is_not_turned(turned: str) -> None:
     asked_of("run.csv", record={"reversed": turned})
 
 
-def test_a_track_with_a_load_cell_is_a_test(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The way is that from the bottom row, which gives way with the machine; frames may lack it."""
-    way = np.linspace(0, 2, 9)
-    motion = np.zeros((9, 6, 3))
-    motion[:, 4:, 1] = -way[:, None]
-    motion[:, :, 1] += 0.1 * way[:, None]
-    motion[3, 5] = np.nan
-    track = xr.Dataset(
-        {"displacement": (("time", "unit", "dof"), motion), "load_force": ("time", 3 * way)},
-        {"dof": ["ux", "uy", "theta"], "j": ("unit", [0, 0, 1, 1, 2, 2])},
+def track_of(way: np.ndarray, top: slice, bottom: slice) -> xr.Dataset:
+    """A track of a squeezed specimen whose fixture gives way, and whose top grip is askew."""
+    motion = np.zeros((len(way), 12, 3))
+    motion[:, :, 1] = 0.1 * way[:, None]
+    motion[:, top, 1] -= way[:, None] * [0.9, 1.0, 1.1]
+    motion[3, top.stop - 1] = np.nan
+    motion[4, bottom.start] = np.nan
+    coordinates = {"dof": ["ux", "uy", "theta"], "j": ("unit", np.repeat(range(4), 3))}
+    force = ("time", 3 * way)
+    return xr.Dataset(
+        {"displacement": (("time", "unit", "dof"), motion), "load_force": force}, coordinates
     )
+
+
+def test_a_track_with_a_load_cell_is_a_test(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The way is that from the bottom row, which gives way with the machine; units may be lost."""
+    way = np.linspace(0, 2, 9)
+    track = track_of(way, slice(9, 12), slice(0, 3))
     monkeypatch.setattr(datasets, "read", lambda *_: track)
-    found = force_displacement.read(asked_of("run.nc"), FOLDER)
-    np.testing.assert_allclose(found, [way, 3 * way], atol=1e-12)
+    found = read(asked_of("run.nc"), FOLDER)
+    np.testing.assert_allclose(found, [way, 3 * way], atol=1e-6)
+    with refused("of 12 units, the lattice of 9", "unit"):
+        read(asked_of("run.nc", lattice=LATTICE | {"rows": 3}), FOLDER)
     track["load_force"][:] = np.nan
     with pytest.raises(UserError, match="no forces"):
-        force_displacement.read(asked_of("run.nc"), FOLDER)
+        read(asked_of("run.nc"), FOLDER)
+
+
+def test_rows_of_a_listed_lattice_go_by_their_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its units all have j = 0; here the first ones are at the top."""
+    places = [(15.0 * i, 15.0 * j) for j in (3, 1, 2, 0) for i in range(3)]
+    arms = [(6.0, 0.0), (0.0, 6.0), (-6.0, 0.0), (0.0, -6.0)]
+    listed = ListedNetwork.model_validate(
+        {
+            "kind": "file",
+            "file": "listed.csv",
+            "spacing": 15.0,
+            "polygons": [[(x + a, y + b) for a, b in arms] for x, y in places],
+            "ligaments": [((x, y + 6.0), (x, y + 9.0)) for x, y in places if y < 45.0],
+        },
+        context=SIM_UNITS,
+    )
+    way = np.linspace(0, 2, 9)
+    track = track_of(way, slice(0, 3), slice(9, 12)).assign_coords(j=("unit", np.zeros(12, int)))
+    monkeypatch.setattr(datasets, "read", lambda *_: track)
+    found = force_displacement.read(asked_of("run.nc"), listed, FOLDER)
+    np.testing.assert_allclose(found, [way, 3 * way], atol=1e-6)
 
 
 def test_a_record_without_the_branch_is_refused(tmp_path: Path) -> None:
@@ -186,7 +221,7 @@ def test_a_record_without_the_branch_is_refused(tmp_path: Path) -> None:
     (tmp_path / "one.csv").write_text(f"displacement (mm),force (N)\n{lines}\n")
     record = {"branch": "unloading"}
     with refused("no such branch", "record", file=tmp_path / "one.csv"):
-        force_displacement.read(asked_of("one.csv", record=record), tmp_path)
+        read(asked_of("one.csv", record=record), tmp_path)
 
 
 @pytest.fixture(scope="module")

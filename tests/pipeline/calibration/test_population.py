@@ -193,7 +193,7 @@ def test_a_force_of_the_wrong_sign_is_refused(asked: Population, tmp_path: Path)
     (tmp_path / "pull.csv").write_text(f"displacement (mm),force (N)\n{lines}\n")
     wrong = asked.data[0].model_copy(update={"file": "pull.csv"})
     with refused("not above zero", "force", file=tmp_path / "pull.csv"):
-        sample_readings.read_curve(wrong, tmp_path)
+        sample_readings.read_curve(wrong, asked.lattice, tmp_path)
 
 
 def test_priors_are_doubled_in_their_logarithms(asked: Population) -> None:
