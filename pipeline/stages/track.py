@@ -22,6 +22,7 @@ from pipeline.runtime import (
 )
 from pipeline.tracking.frames import (
     SYNTHETIC_LABEL,
+    LoadCellLog,
     Recording,
     frame_count,
     has_uneven_intervals,
@@ -32,6 +33,7 @@ from pipeline.tracking.frames import (
     read_pictures,
     recording,
     rendered,
+    video_length,
 )
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import as_built, clamped_units, outlines_of_design
@@ -195,30 +197,40 @@ def _track(path: Path, args: argparse.Namespace) -> None:
         remedy = "write `load_axis: time`, or give the design of a study with driven units"
         what = "the design has no driven units"
         raise UserError(what, file=path, key="load_axis", value=asked.load_axis, remedy=remedy)
-    parents, force = {"design": source, "video": video}, None
-    if (cell := asked.load_cell) is not None:
-        held = parents["load_cell"] = path.parent / cell.file
-        log = load_cell.read(held, cell)
+    parents, log = {"design": source, "video": video}, None
+    if asked.load_cell is not None:
+        held = parents["load_cell"] = path.parent / asked.load_cell.file
+        log = _logged(asked, asked.load_cell, held, video)
     table = sidecar_path(args.out, path, *parents.values(), suffix=".csv")
     track = followed(asked, design, video, path)
-    if cell is not None:
-        force = load_cell.forces(log, track.start + track.time)
+    force = None if log is None else load_cell.forces(log, track.start + track.time)
+    if force is not None and not np.isfinite(force).any():
+        LOG.warning("the load cell's log holds no force at the times of the frames")
     made = assemble_track(design, track, force)
     synthetic = asked.synthetic or rendered(video)
     origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=synthetic)
-    datasets.write(made, args.out, "track", origin)
+    out = args.out
+    if track.ended is not None:  # a build deletes what a rule that failed was to make
+        out = args.out.with_name(f"{args.out.stem}_partial.nc")
+        table = out.with_suffix(".csv")
+    datasets.write(made, out, "track", origin)
     write_track_table(made.assign_attrs(origin), table)
-    if isinstance(track.ended, KeyboardInterrupt):
-        LOG.warning("the %d frames until then are kept in %s", len(track.time), args.out)
+    if track.ended is not None:
+        LOG.warning("the %d frames until then are kept in %s", len(track.time), out)
         raise track.ended
     if not args.no_report:
         words = ["--track", str(args.out), "--video", str(video), "--out-dir"]
         command = shlex.join([*words, str(args.out.with_name(f"{args.out.stem}_report"))])
         LOG.info("overlay and quality page: python -m %sreports tracking %s", PREFIX, command)
-    if track.ended is not None:
-        raise track.ended
-    if cell is not None:
-        load_cell.check(log, track.start + track.time, held, cell)
+
+
+def _logged(asked: Recording, cell: LoadCellLog, held: Path, video: Path) -> load_cell.ForceLog:
+    """Reads a load cell's log, refused before the tracking if it holds nothing of the video."""
+    log = load_cell.read(held, cell)
+    end = np.inf if asked.window.end is None else asked.window.end
+    window = asked.window.start, min(end, video_length(video, asked.frame_rate))
+    load_cell.check(log, window, held, cell)
+    return log
 
 
 def _sources(asked: Recording, path: Path, study: Path | None) -> tuple[Path, Path]:

@@ -6,6 +6,7 @@ from .frame import Frame as Frame
 from .frame_times import has_uneven_intervals as has_uneven_intervals
 from .picture import read_picture as read_picture
 from .picture import read_pictures as read_pictures
+from .recording import LoadCellLog as LoadCellLog
 from .recording import Recording as Recording
 from .recording import load_recording as load_recording
 from .video import SYNTHETIC_LABEL as SYNTHETIC_LABEL
@@ -13,3 +14,4 @@ from .video import frame_count as frame_count
 from .video import orientation_of as orientation_of
 from .video import read_frames as read_frames
 from .video import rendered as rendered
+from .video import video_length as video_length

@@ -1,5 +1,6 @@
 """Tells times of frames, and how many of them a file promises."""
 
+import math
 from pathlib import Path
 
 import av
@@ -71,6 +72,17 @@ def promised_count(
     duration = _duration(container, stream)
     told = [float(stream.frames)] if stream.frames else []
     return min([*told, rate * duration - 1] if duration else told, default=0.0)
+
+
+def told_length(
+    container: av.container.InputContainer, stream: av.VideoStream, rate: float | None
+) -> float:
+    """Computes how long the video is by the file, s, at a rate in place of the file's own times.
+
+    It is infinite where the file does not tell.
+    """
+    told = stream.frames / rate if rate else _duration(container, stream)
+    return told or math.inf
 
 
 def _duration(container: av.container.InputContainer, stream: av.VideoStream) -> float:

@@ -53,17 +53,17 @@ def forces(log: ForceLog, time: Floats) -> Floats:
     return np.where(inside, _smooth(log.clock, log.force, time), np.nan)
 
 
-def check(log: ForceLog, time: Floats, path: Path, cell: LoadCellLog) -> None:
-    """Refuses a log that holds nothing of the video.
+def check(log: ForceLog, window: tuple[float, float], path: Path, cell: LoadCellLog) -> None:
+    """Refuses a log that holds nothing of a window of the video's time, s.
 
     Raises:
         UserError: telling both spans of time.
     """
-    if log.clock[-1] < time[0] or log.clock[0] > time[-1]:
+    start, end = window
+    if log.clock[-1] < start or log.clock[0] > end:
         raise UserError(
             f"the log (from {log.clock[0]:.6g} s to {log.clock[-1]:.6g} s of the video's time) and"
-            f" the frames (from {time[0]:.6g} s to {time[-1]:.6g} s) do not overlap: the track is"
-            " kept, without forces",
+            f" the frames (from {start:.6g} s to {end:.6g} s) do not overlap",
             file=path,
             key="load_cell.offset",
             value=cell.offset,

@@ -1,5 +1,6 @@
 """Reads frames of a video, or of a folder of numbered pictures, with their times."""
 
+import math
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -10,7 +11,7 @@ import av
 from pipeline.runtime import UserError
 from pipeline.tracking.frames.decoded_picture import Orientation, Shades, orientation
 from pipeline.tracking.frames.frame import Frame, broken_off
-from pipeline.tracking.frames.frame_times import FrameClock, goes_on, promised_count
+from pipeline.tracking.frames.frame_times import FrameClock, goes_on, promised_count, told_length
 from pipeline.tracking.frames.picture_folder import pictures, read_folder
 
 SYNTHETIC_LABEL = "SYNTHETIC"
@@ -62,6 +63,17 @@ def frame_count(path: Path) -> int:
             return max(1, round(promised_count(container, stream, float(stream.average_rate or 0))))
     except (av.FFmpegError, FileNotFoundError, IndexError):
         return 1
+
+
+def video_length(path: Path, rate: float | None = None) -> float:
+    """Reads how long a video is, s, at a rate if one is given; infinite where nothing tells."""
+    if path.is_dir():
+        return len(pictures(path)) / rate if rate else math.inf
+    try:
+        with _opened(path) as container:
+            return told_length(container, container.streams.video[0], rate)
+    except (av.FFmpegError, FileNotFoundError, IndexError):
+        return math.inf
 
 
 def _ahead(frames: Iterator[Frame]) -> Iterator[Frame]:

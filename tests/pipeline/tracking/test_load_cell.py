@@ -37,7 +37,7 @@ def test_a_fine_log_is_averaged_over_each_frame(tmp_path: Path) -> None:
 def test_a_faulty_log_is_refused(tmp_path: Path, text: str, offset: float, told: str) -> None:
     path, cell = log(tmp_path, text), LoadCellLog(file="load.csv", offset=offset)
     with refused(told):
-        load_cell.check(load_cell.read(path, cell), TIME, path, cell)
+        load_cell.check(load_cell.read(path, cell), (0.0, 0.4), path, cell)
 
 
 def test_units_of_a_log_are_those_of_its_heading(tmp_path: Path) -> None:

@@ -125,21 +125,47 @@ def test_another_design_is_refused(
 
 
 @pytest.mark.slow
-def test_a_turned_lattice_is_as_told(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A log of another time leaves the track without forces."""
-    recording.with_name("load.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
+def test_a_turned_lattice_is_as_told(recording: Path) -> None:
     text = recording.read_text(encoding="utf-8")
     made, out = [], recording.with_name("track.nc")
-    for turned, code in (("turned: 0 deg", 0), ("turned: 180 deg", 2)):
-        log = "load_cell: {file: load.csv, offset: 70}\n" if code else ""
-        recording.write_text(f"{text}{turned}\n{log}", encoding="utf-8")
-        assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == code
+    for turned in ("turned: 0 deg", "turned: 180 deg"):
+        recording.write_text(f"{text}{turned}\n", encoding="utf-8")
+        assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == 0
         made.append(datasets.read(out, "track"))
     upright, turned_by_half = (each["displacement"].values for each in made)
     assert np.abs(upright[-1, :, :2]).max() > 0.05
     np.testing.assert_allclose(turned_by_half[:, ::-1, :2], -upright[..., :2], atol=0.01)
-    assert np.isnan(made[1]["load_force"]).all()
-    assert "do not overlap: the track is kept" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("offset", "window"), [(70, ""), (-9, ""), (-0.5, "{end: 0.4 s}")])
+def test_a_log_of_another_time_is_refused_before_the_tracking(
+    recording: Path, failing: Failing, offset: float, window: str
+) -> None:
+    recording.with_name("load.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
+    extended(recording, f"load_cell: {{file: load.csv, offset: {offset}}}")
+    if window:
+        extended(recording, f"frame_rate: 10 Hz\nwindow: {window}")
+    words = refused(recording, failing)
+    assert "do not overlap" in words
+    assert "units;" not in words
+
+
+def test_the_track_of_a_video_that_breaks_off_is_kept(tmp_path: Path, failing: Failing) -> None:
+    """Under a name that is no output of a rule: what a failed one was to make is deleted."""
+    whole = (CLIPS / "c_rigid_lossless.mkv").read_bytes()
+    broken = tmp_path / "broken.mkv"
+    broken.write_bytes(whole[: len(whole) * 2 // 3])
+    described = str(CLIPS / "c_rigid_lossless.yaml")
+    words = ["import", described, "--video", str(broken), "--out-dir", str(tmp_path)]
+    assert run_stage("track", words) == 0
+    told = refused(tmp_path / "broken_recording.yaml", failing)
+    kept = tmp_path / "track_partial.nc"
+    assert f"are kept in {kept}" in told
+    assert "breaks off after" in told
+    frames = datasets.read(kept, "track").sizes["time"]
+    assert f"the {frames} frames until then" in told
+    assert kept.with_suffix(".csv").is_file()
+    assert not list(tmp_path.glob("track.*"))
 
 
 @cases("tracking", "changes, key, what")

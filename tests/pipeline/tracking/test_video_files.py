@@ -9,7 +9,7 @@ import av
 import numpy as np
 import pytest
 
-from pipeline.tracking.frames import BrokenOffError, read_frames
+from pipeline.tracking.frames import BrokenOffError, read_frames, video_length
 from tests.tables import refused
 
 RATE = 30
@@ -54,6 +54,17 @@ def trimmed(path: Path, first: float, shown: float) -> Path:
     struct.pack_into(">Ii", held, place, round(1000 * shown), start)
     path.write_bytes(held)
     return path
+
+
+@pytest.mark.parametrize(("suffix", "codec"), [("mp4", "libx264"), ("avi", "mjpeg")])
+def test_the_length_of_a_video_is_told_by_its_file(suffix: str, codec: str, tmp_path: Path) -> None:
+    path = written(tmp_path / f"a.{suffix}", list(range(60)), codec)
+    assert video_length(path) == pytest.approx(60 / RATE, abs=1 / RATE)
+    assert video_length(path, 10.0) == pytest.approx(6.0)
+    for number in range(5):
+        (tmp_path / f"{number}.png").write_bytes(b"a picture")
+    assert video_length(tmp_path, 10.0) == 0.5
+    assert video_length(tmp_path) == video_length(tmp_path / "none.mp4") == np.inf
 
 
 def test_dropped_frames_of_an_avi_break_nothing_off(tmp_path: Path) -> None:
