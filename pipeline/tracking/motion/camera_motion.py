@@ -5,7 +5,7 @@ import logging
 import numpy as np
 
 from pipeline.runtime import UserError
-from pipeline.tracking.geometry import SpecimenOutlines, rigid_motion, rotation_matrix
+from pipeline.tracking.geometry import SpecimenOutlines, arm_swing, rigid_motion, rotation_matrix
 from pipeline.tracking.reference_frame import CameraCalibration, RecordingSetup
 from sim.core import Floats, Mask, Reals
 
@@ -41,7 +41,8 @@ def remove_camera_motion(
     if setup.follows_supports:
         subtract_motion(motion, specimen.centre, common)
         return
-    ends = np.nanmax(np.abs(common[:, :2])) / pixel
+    moved = common[:, None, :2] + arm_swing(common[:, None, 2], specimen.centre[held])
+    ends = np.nanmax(np.linalg.norm(moved, axis=2)) / pixel
     if ends > _MOVED:
         LOG.warning(
             "all clamped units move together, by up to %.2f px: the camera moved, or what"

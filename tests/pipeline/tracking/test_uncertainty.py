@@ -117,6 +117,20 @@ def test_what_clamped_units_do_not_tell_of_the_camera_is_in_sigma() -> None:
     np.testing.assert_allclose(motion[1:, ~held].var(axis=0), told, rtol=0.15)
 
 
+@pytest.mark.parametrize("turn", [0.0, 0.01])
+def test_motion_of_the_clamped_units_is_told_where_they_are(
+    turn: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Two of them, far from the origin, about which noise looks as if it moved what is there."""
+    held = np.arange(SIDE**2) >= SIDE**2 - 2
+    motion = 0.02 * np.random.default_rng(13).normal(size=(50, SIDE**2, 3))
+    motion[..., :2] += turn * CENTRE[:, ::-1] * [-1.0, 1.0]
+    sigma = np.full_like(motion, 0.02)
+    remove_camera_motion(motion, sigma, SHOWN, 1.0, RecordingSetup(held=held))
+    assert bool(caplog.text) == (turn > 0)
+    assert ("all clamped units move together, by up to 2.0" in caplog.text) == (turn > 0)
+
+
 def test_a_part_in_which_nothing_is_seen_does_not_disturb_the_others() -> None:
     frames = 500
     motion = _rough(frames)[..., None] + np.zeros(3)
