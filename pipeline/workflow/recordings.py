@@ -61,18 +61,21 @@ def comparisons(wildcards: Wildcards) -> list[str]:
     return [f"results/{study}/recordings/{name}/comparison.nc" for name in names]
 
 
-def compared(wildcards: Wildcards) -> dict[str, str]:
+def compared(wildcards: Wildcards) -> dict[str, str | list[str]]:
     """Names the recording's YAML that a comparison depends on, as it is tracked."""
     return {"recording": tracked(wildcards)["recording"]}
 
 
-def tracked(wildcards: Wildcards) -> dict[str, str]:
-    """Lists the files that tracking depends on: YAML, video, design, load cell."""
+def tracked(wildcards: Wildcards) -> dict[str, str | list[str]]:
+    """Lists the files that tracking depends on: YAML, video, design, load cell.
+
+    Of a folder of pictures also these, as one that is written anew leaves the folder as it was.
+    """
     asked = described(wildcards)
     study = f"results/{wildcards.name}{wildcards.preset}"
     if asked is None or asked.virtual is not None:
         stem = f"{study}/recordings/{wildcards.recording}"
-        files = {
+        files: dict[str, str | list[str]] = {
             "recording": f"{stem}.yaml",
             "video": f"{stem}.mp4",
             "design": f"{study}/design.nc",
@@ -84,7 +87,22 @@ def tracked(wildcards: Wildcards) -> dict[str, str]:
     if asked.load_cell is not None:
         beside["load_cell"] = asked.load_cell.file
     named = {key: str(folder / file) for key, file in beside.items() if file is not None}
-    return {"recording": _source(wildcards), "design": f"{study}/design.nc", **named}
+    pictures = _pictures(folder / str(asked.video))
+    return {
+        "recording": _source(wildcards),
+        "design": f"{study}/design.nc",
+        **named,
+        **({"pictures": pictures} if pictures else {}),
+    }
+
+
+def _pictures(video: Path) -> list[str]:
+    """Lists the pictures of a video that is a folder, from where the project lies."""
+    try:
+        found = frames.pictures(WORK / video) if (WORK / video).is_dir() else []
+    except UserError:  # there are none, as its stage will tell
+        found = []
+    return [str(video / path.name) for path in found]
 
 
 def filmed(wildcards: Wildcards) -> str:

@@ -6,6 +6,7 @@ from .frame import Frame as Frame
 from .frame_times import has_uneven_intervals as has_uneven_intervals
 from .picture import read_picture as read_picture
 from .picture import read_pictures as read_pictures
+from .picture_folder import pictures as pictures
 from .recording import LoadCellLog as LoadCellLog
 from .recording import Recording as Recording
 from .recording import load_recording as load_recording

@@ -74,7 +74,7 @@ def promised_count(
     return min([*told, rate * duration - 1] if duration else told, default=0.0)
 
 
-def told_length(
+def stream_length(
     container: av.container.InputContainer, stream: av.VideoStream, rate: float | None
 ) -> float:
     """Computes how long the video is by the file, s, at a rate in place of the file's own times.

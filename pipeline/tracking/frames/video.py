@@ -11,7 +11,7 @@ import av
 from pipeline.runtime import UserError
 from pipeline.tracking.frames.decoded_picture import Orientation, Shades, orientation
 from pipeline.tracking.frames.frame import Frame, broken_off
-from pipeline.tracking.frames.frame_times import FrameClock, goes_on, promised_count, told_length
+from pipeline.tracking.frames.frame_times import FrameClock, goes_on, promised_count, stream_length
 from pipeline.tracking.frames.picture_folder import pictures, read_folder
 
 SYNTHETIC_LABEL = "SYNTHETIC"
@@ -71,7 +71,7 @@ def video_length(path: Path, rate: float | None = None) -> float:
         return len(pictures(path)) / rate if rate else math.inf
     try:
         with _opened(path) as container:
-            return told_length(container, container.streams.video[0], rate)
+            return stream_length(container, container.streams.video[0], rate)
     except (av.FFmpegError, FileNotFoundError, IndexError):
         return math.inf
 

@@ -1,7 +1,10 @@
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
+from pipeline.workflow import recordings
 from pipeline.workflow.recordings import shown_recordings
 
 VIRTUAL = "structure: cloaked\nvirtual: {}\n"
@@ -43,3 +46,21 @@ def test_a_film_that_a_preset_does_not_show_replaces_nothing_there(folder: Path)
     (folder / "lab7.yaml").write_text("video: lab7.mp4\nstructure: cloaked\n")
     assert shown(folder) == ["altered", "lab7"]
     assert shown(folder, "study@quick") == ["cloaked"]
+
+
+def test_tracking_depends_on_each_picture_of_a_folder(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that is written anew leaves the folder's own time as it was."""
+    monkeypatch.setattr(recordings, "WORK", folder.parents[2])
+    (folder / "lab7.yaml").write_text("video: lab7\nframe_rate: 10 Hz\n")
+    wanted: Any = SimpleNamespace(name="study", preset="", recording="lab7")
+    beside = "experiments/study/recordings/lab7"
+    (folder / "lab7").mkdir()
+    assert "pictures" not in recordings.tracked(wanted)
+    for name in ("frame10.png", "frame9.png", "notes.txt"):
+        (folder / "lab7" / name).write_bytes(b"held")
+    found = recordings.tracked(wanted)
+    assert found["video"] == beside
+    assert found["pictures"] == [f"{beside}/frame9.png", f"{beside}/frame10.png"]
+    assert recordings.compared(wanted) == {"recording": f"{beside}.yaml"}
