@@ -9,7 +9,7 @@ import xarray as xr
 
 from pipeline import datasets
 from pipeline.datasets import provenance
-from pipeline.problem.sections import VirtualRecording
+from pipeline.problem.sections import VirtualRecording, write_quantity
 from pipeline.runtime import UserError, cli, found_in, sidecar_path, write_atomically
 from pipeline.tracking.frames import SYNTHETIC_LABEL, Recording
 from pipeline.tracking.frames import recording as recordings
@@ -141,7 +141,22 @@ def _described(
         "pixel_size": f"{virtual.camera.pixel_size:g} mm",
         "thickness": f"{virtual.look.thickness:g} mm",
         "camera_distance": f"{virtual.camera.distance:g} mm",
+        **_viewed(asked),
         "load_axis": asked.load_axis,
         "load_cell": log,
         "synthetic": True,
+    }
+
+
+def _viewed(asked: Recording) -> dict[str, object]:
+    """Lists how the video is to be read, as the recording that it is rendered by tells."""
+    window, default = asked.window, Recording.model_fields["camera"].default
+    ends = {"start": window.start or None, "end": window.end}
+    shown = {key: write_quantity(time, "s") for key, time in ends.items() if time is not None}
+    return {
+        "turned": None if asked.turned is None else write_quantity(asked.turned, "rad"),
+        "mirrored": asked.mirrored,
+        "exposure": None if asked.exposure is None else write_quantity(asked.exposure, "s"),
+        "camera": None if asked.camera == default else asked.camera,
+        "window": shown or None,
     }

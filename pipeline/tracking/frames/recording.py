@@ -119,6 +119,28 @@ class Recording(Section):
         exactly_one(self, "video", "virtual")
         return self
 
+    @model_validator(mode="after")
+    def _as_rendered(self) -> Self:
+        """Refuses what differs from the section `virtual`, which alone tells it there."""
+        if self.virtual is None:
+            return self
+        if self.readout:
+            what = "the virtual camera reads all rows at once"
+            raise fault(what, "leave it out beside virtual", "readout")
+        camera, look = self.virtual.camera, self.virtual.look
+        own = {
+            "pixel_size": (camera.pixel_size, "camera.pixel_size"),
+            "thickness": (look.thickness, "look.thickness"),
+            "camera_distance": (camera.distance, "camera.distance"),
+            "frame_rate": (self.virtual.rate, "rate"),
+            "load_cell": (None, "load_cell"),
+        }
+        for key, (value, place) in own.items():
+            if getattr(self, key) not in (value, type(self).model_fields[key].default):
+                what = f"of a video that is rendered, virtual.{place} tells it"
+                raise fault(what, f"leave it out, or write it in virtual.{place}", key)
+        return self
+
 
 def load_recording(path: Path) -> Recording:
     """Loads the recording in a YAML file.

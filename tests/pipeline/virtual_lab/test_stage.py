@@ -59,6 +59,29 @@ def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> No
         assert float(video.streams.video[0].average_rate or 0) == 20.0
 
 
+def test_how_a_video_is_read_goes_over_to_its_recording(files: Path, tmp_path: Path) -> None:
+    read = {"turned": "180 deg", "mirrored": True, "exposure": "1.5 ms"}
+    read |= {"camera": "follows supports", "window": {"start": "0.05 s", "end": "0.2 s"}}
+    agreeing = {"pixel_size": "0.365 mm", "thickness": "8 mm", "camera_distance": "1000 mm"}
+    asked, out = recording(tmp_path), tmp_path / "run.mp4"
+    text = yaml.safe_load(asked.read_text(encoding="utf-8")) | read | agreeing
+    asked.write_text(yaml.safe_dump(text), encoding="utf-8")
+    assert render(files, asked, out) == 0
+    wanted, found = load_recording(asked), load_recording(out.with_suffix(".yaml"))
+    for name in (*read, *agreeing):
+        assert getattr(found, name) == getattr(wanted, name), name
+
+
+@cases("virtual_lab", "line, key, told")
+def test_what_virtual_tells_is_refused_beside_it(
+    line: str, key: str, told: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "virtual.yaml"
+    path.write_text(f"virtual: {{ rate: 30 Hz }}\n{line}\n", encoding="utf-8")
+    with refused(told, key, file=path):
+        load_recording(path)
+
+
 def test_a_log_of_many_lines_in_a_millisecond_can_be_read(files: Path, tmp_path: Path) -> None:
     asked = recording(tmp_path, load_cell={"rate": "24 kHz"})
     out = tmp_path / "load.csv"
