@@ -39,6 +39,7 @@ class TestPath(NamedTuple):
     law: Floats  # (n_ligaments, 3) stiffness
     mass: Floats  # (n_units, 3)
     damping: Floats  # (n_units, 3)
+    length: float  # of the ligaments, mm
 
     def slope(self, values: Floats) -> Floats:
         """Differentiates values (n, ...) by the displacement."""
@@ -71,7 +72,8 @@ def follow_test(specimen: Lattice, test: TestKind, constants: Constants, end: fl
     whole = np.concatenate([np.zeros_like(motion[:1]), motion])
     found = (np.asarray(part) for part in jax.vmap(strains)(jnp.asarray(whole)))
     rest = (np.asarray(part) for part in (made.law, made.mass, made.damping))
-    return TestPath(np.r_[0.0, displacement], np.r_[0.0, force], whole, *found, *rest)
+    length = specimen.ligament_length
+    return TestPath(np.r_[0.0, displacement], np.r_[0.0, force], whole, *found, *rest, length)
 
 
 def _itself(motion: Numbers, _: Parameters) -> Array:
@@ -121,7 +123,7 @@ def _later_start(path: TestPath) -> Floats:
 
 def _shear_stretch(path: TestPath) -> Floats:
     """Adds a tension of sheared ligaments: k_a (l g^2 / 2)^2 / 2 of a hundredth of k_a."""
-    return 0.01 * path.slope((path.shear**4) @ path.law[:, 0] * 2.25**2 / 8)
+    return 0.01 * path.slope((path.shear**4) @ path.law[:, 0] * path.length**2 / 8)
 
 
 MECHANISMS = (

@@ -179,6 +179,17 @@ def test_what_is_missing_is_found(asked: Population, centre: Constants) -> None:
     np.testing.assert_allclose((ranked[0].explained, ranked[0].wanted), (0.5, 2.0), rtol=1e-6)
 
 
+def test_the_stretch_of_sheared_ligaments_goes_by_their_length(
+    asked: Population, centre: Constants
+) -> None:
+    """The square of the length."""
+    stretch = next(each for each in missing_physics.MECHANISMS if "stretch" in each.name)
+    path = missing_physics.follow_test(asked.lattice, "shear", centre, 3.75)
+    assert path.length == asked.lattice.ligament_length
+    longer = stretch.change(path._replace(length=2 * path.length))
+    np.testing.assert_allclose(longer, 4 * stretch.change(path), rtol=1e-12)
+
+
 @cases("calibration", "old, new, told")
 def test_slips_in_the_file(old: str, new: str, told: str, tmp_path: Path) -> None:
     text = FILE.read_text().replace("hinge_statics/r", f"{FILE.parent}/hinge_statics/r")
