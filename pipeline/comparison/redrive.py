@@ -16,7 +16,7 @@ from pipeline.posing import PosedStructure
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints, Mask, Numbers, SimulationError
 from sim.energy import observe
-from sim.scene import Scene, concrete_parameters, simulate
+from sim.scene import Scene, concrete_parameters, drive_force, simulate
 from sim.solvers import PrescribedMotion
 
 FINER = 2
@@ -148,7 +148,10 @@ def simulate_redriven(structure: PosedStructure, held: HeldMotion, times: Floats
         found = np.empty((0, *shape[1:])) if error.states is None else error.states
         found = found.reshape(-1, *shape[1:])
     if len(found):
-        seen = observe(driven.topology, concrete_parameters(driven, vertices), found)
+        values = concrete_parameters(driven, vertices)
+        seen = observe(driven.topology, values, found)
         displacement[: len(found)] = found
-        force[: len(found)] = seen.force_on(scene.loads.driven)
+        force[: len(found)] = drive_force(
+            driven, values, seen, driven.loads.cases[0], times[: len(found)], scene.loads.driven
+        )
     return RedrivenMotion(displacement, force, failure)

@@ -19,7 +19,7 @@ from pipeline.runtime import cli
 from sim.core import Floats, Ints
 from sim.energy import observe
 from sim.quasistatics import StaticSolver
-from sim.scene import Scene, cases_of, make_plan, simulate
+from sim.scene import Scene, cases_of, drive_force, make_plan, simulate
 from sim.solvers import Measure, Solved, Solver, run_batch
 from sim.structure import MOST_ROUNDS
 
@@ -89,9 +89,10 @@ def _solver(scene: Scene, vertices: Floats, times: Floats) -> Solver:
 
 def _measure(scene: Scene, driven: Ints) -> Measure[tuple[Floats, Floats]]:
     def reduce(solved: Solved) -> tuple[Floats, Floats]:
-        motion = solved.displacement
-        seen = observe(scene.topology, solved.case.values, motion)
-        return motion, seen.force_on(driven)
+        case, motion = solved.case, solved.displacement
+        seen = observe(scene.topology, case.values, motion)
+        times = case.solver.output_times
+        return motion, drive_force(scene, case.values, seen, case.drive, times, driven)
 
     return reduce
 

@@ -138,7 +138,7 @@ def measure(
             displacement=shown,
             velocity=solved.velocity[times.shown],
             observables=seen,
-            drive_force=drive_force(scene, seen, case.drive, times.asked[times.shown]),
+            drive_force=drive_force(scene, case.values, seen, case.drive, times.asked[times.shown]),
             roi_energy=_roi_energy(scene, case, shown),
             gap=_at_stride(found.gap, stride, len(shown)),
             overlapping=_at_stride(found.overlaps, stride, len(shown)),
@@ -220,7 +220,9 @@ def _traced(solved: Solved, scene: Scene) -> TracedPath:
     motion = found.states[:, : 3 * top.n_units].reshape(len(found.loads), -1, 3)
     seen = observe(top, case.values, motion)
     return TracedPath(
-        found.loads, drive_force(scene, seen, case.drive, found.loads), found.eigenvalue
+        found.loads,
+        drive_force(scene, case.values, seen, case.drive, found.loads),
+        found.eigenvalue,
     )
 
 

@@ -13,7 +13,16 @@ from pipeline.problem.sections import Robustness, Tolerances
 from pipeline.runtime import cli
 from sim.core import Floats
 from sim.energy import observe
-from sim.scene import Scene, cases_of, make_plan, mimicking, sample_times, scales, target_motion
+from sim.scene import (
+    Scene,
+    cases_of,
+    drive_force,
+    make_plan,
+    mimicking,
+    sample_times,
+    scales,
+    target_motion,
+)
 from sim.solvers import Measure, MotionLaw, Outcome, Solved, run_batch
 from sim.structure import MOST_ROUNDS, Perturbation, PerturbedStructure
 from sim.structure import perturbed as perturbed_structure
@@ -147,7 +156,7 @@ def _measure(scene: Scene, target: Floats | None) -> Measure[PerturbedResponse]:
         inside = motion[:, scene.objective.region]
         apart = (inside if aim is None else inside - aim[0]) / scale
         seen = observe(scene.topology, case.values, motion)
-        force = seen.force_on(scene.loads.driven)
+        force = drive_force(scene, case.values, seen, case.drive, sample_times(scene))
         loss = mimicking(scene, aim)(jnp.asarray(motion[None]), case.values)
         return PerturbedResponse(
             np.abs(inside[..., 2]).mean(axis=1),

@@ -1,3 +1,4 @@
+from .drive_forces import drive_force as drive_force
 from .evaluation import Evaluator as Evaluator
 from .evaluation import GradientChain as GradientChain
 from .evaluation import constraints_of as constraints_of
@@ -37,7 +38,6 @@ from .scene import Structure as Structure
 from .simulation import Mimicking as Mimicking
 from .simulation import Response as Response
 from .simulation import cases_of as cases_of
-from .simulation import drive_force as drive_force
 from .simulation import mimicking as mimicking
 from .simulation import simulate as simulate
 from .simulation import target_motion as target_motion

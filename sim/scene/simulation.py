@@ -14,6 +14,7 @@ from jax import Array
 
 from sim.core import Floats, Ints, Numbers
 from sim.energy import Observables, observe
+from sim.scene.drive_forces import drive_force
 from sim.scene.objectives import (
     DisplacementMimicking,
     ReactionMimicking,
@@ -26,7 +27,7 @@ from sim.scene.parameter_map import concrete_parameters, parameters_of_design
 from sim.scene.plan import Plan, make_plan, sample_times
 from sim.scene.scene import Scene
 from sim.scene.soundness import check_cases, check_units
-from sim.solvers import Case, PrescribedMotion, Solver, concrete, differentiable_motion, solve_cases
+from sim.solvers import Case, Solver, concrete, differentiable_motion, solve_cases
 from sim.structure import Parameters
 from sim.time_integration import simpson_weights
 
@@ -69,11 +70,11 @@ class Response:
 
     @cached_property
     def drive_force(self) -> Floats:
-        """(n_cases, n_times, 2) force on the driven units, N."""
+        """(n_cases, n_times, 2) force on the driven units, N; in time with their inertia."""
         drives = [self.scene.loads.cases[case] for case in self.cases]
         return np.stack(
             [
-                drive_force(self.scene, seen, drive, self.times)
+                drive_force(self.scene, self.parameters, seen, drive, self.times)
                 for seen, drive in zip(self.observables, drives, strict=True)
             ]
         )
@@ -172,12 +173,6 @@ def _planned(
     if threads in (None, solver.threads):
         return plan
     return replace(plan, solver=replace(solver, threads=threads))
-
-
-def drive_force(scene: Scene, seen: Observables, drive: PrescribedMotion, times: Floats) -> Floats:
-    """Sums the forces (n_times, 2) on the driven units: held in place, and put on, N."""
-    put_on = drive.forces(times)[..., :2].sum(axis=1)
-    return np.asarray(seen.force_on(scene.loads.driven) + put_on)
 
 
 def _solved(response: Response, solvers: tuple[Solver, ...]) -> Response:

@@ -1,5 +1,6 @@
 """Prescribes the motion of units, or the forces on them."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
@@ -9,7 +10,8 @@ from jax import Array
 
 from sim.core import Floats, Ints, Numbers
 from sim.energy import Topology
-from sim.solvers.loads import FORCE, MotionLaw, held_values, loaded_units
+from sim.solvers.loads import DISPLACEMENT, FORCE, MotionLaw, held_values, loaded_units
+from sim.structure import ConcreteParameters
 
 
 class PrescribedMotion(NamedTuple):
@@ -39,6 +41,18 @@ class PrescribedMotion(NamedTuple):
         each = np.broadcast_to(self._at(times).reshape(len(times), -1, 3), shape)
         return np.where(self.control == FORCE, each, 0.0)
 
+    def resistance(self, values: ConcreteParameters, times: Floats) -> Floats:
+        """Forces (n_times, n, 3) that accelerate and damp its units where it displaces them.
+
+        They are in N and N mm.
+        """
+        rates, accelerations = (
+            self._of_law(of, times).reshape(len(times), -1, 3)
+            for of in (rates_of, accelerations_of)
+        )
+        found = values.damping[self.units] * rates + values.mass[self.units] * accelerations
+        return found if self.control is None else np.where(self.control == DISPLACEMENT, found, 0.0)
+
     def values(self, held: Ints, times: Floats) -> Floats:
         """Values (n_times, n_held) of the held dofs."""
         return np.asarray(held_values(held, self.units, self._at(times), self.control))
@@ -58,13 +72,23 @@ class PrescribedMotion(NamedTuple):
 
     def rates(self, held: Ints, times: Floats) -> Floats:
         """Their rates of change, per s."""
-        # of a length that is a power of 2: JAX compiles for every new one
-        padded = np.pad(times, (0, (1 << (len(times) - 1).bit_length()) - len(times)), mode="edge")
-        rates = np.asarray(rates_of(self.motion, padded))[: len(times)]
+        rates = self._of_law(rates_of, times)
         return np.asarray(held_values(held, self.units, rates, self.control))
+
+    def _of_law(self, of: Callable[..., Numbers], times: Floats) -> Floats:
+        """Computes a derivative (n_times, ..., 3) of the motion."""
+        # at a number of times that is a power of 2: JAX compiles for every new one
+        padded = np.pad(times, (0, (1 << (len(times) - 1).bit_length()) - len(times)), mode="edge")
+        return np.asarray(of(self.motion, padded))[: len(times)]
 
 
 @jax.jit
 def rates_of(motion: MotionLaw, times: Array) -> Numbers:
     """Differentiates a law by the time: rates (n_times, n, 3), per s."""
     return jax.jvp(motion, (times,), (jnp.ones_like(times),))[1]
+
+
+@jax.jit
+def accelerations_of(motion: MotionLaw, times: Array) -> Numbers:
+    """Differentiates a law by the time twice: accelerations (n_times, n, 3), per s^2."""
+    return jax.jvp(lambda at: rates_of(motion, at), (times,), (jnp.ones_like(times),))[1]
