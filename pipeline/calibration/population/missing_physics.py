@@ -72,8 +72,8 @@ def follow_test(specimen: Lattice, test: TestKind, constants: Constants, end: fl
     whole = np.concatenate([np.zeros_like(motion[:1]), motion])
     found = (np.asarray(part) for part in jax.vmap(strains)(jnp.asarray(whole)))
     rest = (np.asarray(part) for part in (made.law, made.mass, made.damping))
-    length = specimen.ligament_length
-    return TestPath(np.r_[0.0, displacement], np.r_[0.0, force], whole, *found, *rest, length)
+    path = np.r_[0.0, displacement], np.r_[0.0, force], whole
+    return TestPath(*path, *found, *rest, length=specimen.ligament_length)
 
 
 def _itself(motion: Numbers, _: Parameters) -> Array:
