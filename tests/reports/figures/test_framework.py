@@ -37,6 +37,7 @@ def test_its_page_works_from_disk(folder: Path) -> None:
     assert all(address.startswith("data:") for address in links.loaded)
     assert {"fig1.pdf", "fig1.svg", "fig1.png"} <= set(links.hrefs.values())
     assert "SYNTHETIC" in html
+    assert not any("index.html" in href for href in links.hrefs.values())  # it is made later
 
 
 @pytest.mark.slow
