@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 
 from pipeline import datasets
 from pipeline.datasets import provenance
+from pipeline.problem import content_hash
 from pipeline.runtime import INSTALLED, ROOT, UserError, refusal
 from pipeline.workflow.crates import (
     BUILT,
@@ -26,6 +27,7 @@ from pipeline.workflow.crates import (
     named_outside,
 )
 from pipeline.workflow.reproduce import PASSING, SOURCES
+from pipeline.workflow.studies import problem_of
 
 LOG = logging.getLogger(__name__)
 
@@ -49,6 +51,7 @@ def work(args: argparse.Namespace) -> None:
     if not page.is_file():
         remedy = f"build it first: make {asked.target}"
         raise UserError("there is no built study to publish", file=page, remedy=remedy)
+    check_page(asked, page)
     check_sources()
     for name in asked.folders:
         check_commits(ROOT / "results" / name)
@@ -67,6 +70,19 @@ def work(args: argparse.Namespace) -> None:
     except OSError as error:
         raise refusal(out, error) from error
     LOG.info("crate: %s", out)
+
+
+def check_page(asked: Publication, page: Path) -> None:
+    """Checks that a page was drawn of the problems as they stand: it names their hashes.
+
+    Raises:
+        UserError: it was not.
+    """
+    text = page.read_text(encoding="utf-8")
+    for study in asked.studies:
+        if (wanted := content_hash(problem_of(study))) not in text:
+            what, remedy = "the page shows another problem", f"build it again: make {asked.target}"
+            raise UserError(what, file=page, key="problem_hash", value=wanted, remedy=remedy)
 
 
 def check_sources(root: Path = ROOT) -> None:
@@ -105,8 +121,9 @@ def copy_sources(asked: Publication, folder: Path) -> None:
     folder.mkdir()
     homes = {str(Path(name).parent) for name in asked.inputs}
     outside = {str(path) for study in asked.studies for path in named_outside(study)}
+    there = [name for name in _FOLDERS if (ROOT / name).is_dir()]  # none of which a build needs
     studies = sorted(homes | outside | {str(SCHEMA)})
-    for name in (*set(SOURCES) - {"experiments"}, *studies, *_FOLDERS, *_BESIDE, *_LOCKS):
+    for name in (*set(SOURCES) - {"experiments"}, *studies, *there, *_BESIDE, *_LOCKS):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         if (ROOT / name).is_dir():
             shutil.copytree(ROOT / name, folder / name, ignore=_NOT_SOURCES, dirs_exist_ok=True)

@@ -10,7 +10,7 @@ import rocrate
 
 from pipeline import datasets
 from pipeline.datasets import provenance
-from pipeline.problem import outputs, section_hash
+from pipeline.problem import content_hash, outputs, section_hash
 from pipeline.runtime import REPORTED, ROOT, UserError
 from pipeline.workflow import publish
 from pipeline.workflow.crates import BUILT, Publication, describe, leftovers, named_outside
@@ -130,6 +130,16 @@ def test_what_is_not_of_the_problem_is_left_out_or_refused(tmp_path: Path) -> No
     with pytest.raises(UserError, match="another problem than the study's") as told:
         leftovers(study, tmp_path)
     assert told.value.key == "problem_hash"
+
+
+def test_a_page_of_another_problem_is_refused(tmp_path: Path) -> None:
+    asked, page = Publication.of("fig3@quick"), tmp_path / "index.html"
+    hashes = [content_hash(problem_of(study)) for study in asked.studies]
+    page.write_text(" ".join(hashes))
+    publish.check_page(asked, page)
+    page.write_text(hashes[0])
+    with pytest.raises(UserError, match="shows another problem"):
+        publish.check_page(asked, page)
 
 
 def test_sources_that_are_not_as_committed_are_refused(tmp_path: Path) -> None:
