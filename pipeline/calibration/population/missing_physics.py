@@ -30,6 +30,7 @@ STEPS = 60
 class TestPath(NamedTuple):
     """Holds the equilibria of one specimen and test."""
 
+    length: float  # of the ligaments, mm
     displacement: Floats  # (n,) of the grips from zero on, mm
     force: Floats  # (n,) N
     motion: Floats  # (n, n_units, 3) mm, mm, rad
@@ -72,8 +73,13 @@ def follow_test(specimen: Lattice, test: TestKind, constants: Constants, end: fl
     whole = np.concatenate([np.zeros_like(motion[:1]), motion])
     found = (np.asarray(part) for part in jax.vmap(strains)(jnp.asarray(whole)))
     rest = (np.asarray(part) for part in (made.law, made.mass, made.damping))
+<<<<<<< HEAD
     path = np.r_[0.0, displacement], np.r_[0.0, force], whole
     return TestPath(*path, *found, *rest, length=specimen.ligament_length)
+=======
+    length = specimen.ligament_length
+    return TestPath(length, np.r_[0.0, displacement], np.r_[0.0, force], whole, *found, *rest)
+>>>>>>> bdc297e9 (Take the ligaments' length of a missing stretch from its specimen)
 
 
 def _itself(motion: Numbers, _: Parameters) -> Array:
