@@ -40,7 +40,6 @@ class TestPath(NamedTuple):
     law: Floats  # (n_ligaments, 3) stiffness
     mass: Floats  # (n_units, 3)
     damping: Floats  # (n_units, 3)
-    length: float  # of the ligaments, mm
 
     def slope(self, values: Floats) -> Floats:
         """Differentiates values (n, ...) by the displacement."""
@@ -73,13 +72,8 @@ def follow_test(specimen: Lattice, test: TestKind, constants: Constants, end: fl
     whole = np.concatenate([np.zeros_like(motion[:1]), motion])
     found = (np.asarray(part) for part in jax.vmap(strains)(jnp.asarray(whole)))
     rest = (np.asarray(part) for part in (made.law, made.mass, made.damping))
-<<<<<<< HEAD
-    path = np.r_[0.0, displacement], np.r_[0.0, force], whole
-    return TestPath(*path, *found, *rest, length=specimen.ligament_length)
-=======
     length = specimen.ligament_length
     return TestPath(length, np.r_[0.0, displacement], np.r_[0.0, force], whole, *found, *rest)
->>>>>>> bdc297e9 (Take the ligaments' length of a missing stretch from its specimen)
 
 
 def _itself(motion: Numbers, _: Parameters) -> Array:
