@@ -187,12 +187,16 @@ def _corners(lattice: Lattice, free: np.ndarray) -> Ints:
 
 
 def _voids(lattice: Lattice, free: np.ndarray) -> Ints:
-    """Lists both sides of each ligament, as two edges starting at its ends (clockwise first)."""
+    """Lists both sides of each ligament, as two edges starting at its ends (clockwise first).
+
+    A void so wide that it is unwrapped otherwise is none: it is far from closed.
+    """
     a, b = lattice.ligaments.T
     after, before = lattice.next_vertex, lattice.previous_vertex
     one = np.stack([b, before[b], a, after[a]], axis=1)
     other = np.stack([a, before[a], b, after[b]], axis=1)
-    return _touched(np.concatenate([one, other]), free)
+    usual = lattice.void_branch.T.ravel() == VOID_BRANCH
+    return _touched(np.concatenate([one, other])[usual], free)
 
 
 def _pairs(lattice: Lattice, free: np.ndarray) -> Ints:

@@ -15,11 +15,11 @@ from .gaps import displaced as displaced
 from .gaps import overlapping_pairs as overlapping_pairs
 from .gaps import polygons as polygons
 from .gaps import smallest_gap as smallest_gap
-from .geometry import VOID_BRANCH as VOID_BRANCH
 from .geometry import angle_between as angle_between
 from .geometry import shape as shape
 from .geometry import unwrap as unwrap
 from .geometry import void_angles as void_angles
+from .lattice import VOID_BRANCH as VOID_BRANCH
 from .lattice import Lattice as Lattice
 from .lattice import honeycomb as honeycomb
 from .lattice import kagome as kagome

@@ -9,10 +9,6 @@ from jax import Array
 from sim.core import Floats, Ints, Numbers
 from sim.structure.lattice import Lattice
 
-VOID_BRANCH = -jnp.pi / 4
-"""Void angles are unwrapped on [VOID_BRANCH, VOID_BRANCH + 2 pi): open voids reach beyond 270 deg,
-overlapping edges are slightly negative."""
-
 
 class Shape(NamedTuple):
     """Reference shape of a network."""
@@ -38,6 +34,7 @@ class LatticeArrays(NamedTuple):
     ligament_vectors: Floats
     next_vertex: Ints
     previous_vertex: Ints
+    void_branch: Floats
 
     @property
     def n_units(self) -> int:
@@ -83,7 +80,8 @@ def void_angles(lattice: Lattice | LatticeArrays, vertices: Numbers) -> Array:
 
     The first lies between the clockwise edge of the second end and the counter-clockwise edge of
     the first end, the second on the other side (DifFlexMM's convention). Under a motion of rigid
-    units a and b they change by exactly theta_a - theta_b and theta_b - theta_a.
+    units a and b they change by exactly theta_a - theta_b and theta_b - theta_a. A turn is added
+    below the branch of a void, which the initial lattice tells.
     """
     first, second = lattice.ligaments.T
     one = angle_between(
@@ -94,7 +92,7 @@ def void_angles(lattice: Lattice | LatticeArrays, vertices: Numbers) -> Array:
         vertices[lattice.previous_vertex[first]] - vertices[first],
         vertices[lattice.next_vertex[second]] - vertices[second],
     )
-    return unwrap(jnp.stack([one, other], axis=1), VOID_BRANCH)
+    return unwrap(jnp.stack([one, other], axis=1), lattice.void_branch)
 
 
 def angle_between(start: Numbers, end: Numbers) -> Array:
@@ -103,6 +101,6 @@ def angle_between(start: Numbers, end: Numbers) -> Array:
     return jnp.arctan2(cross, jnp.sum(start * end, axis=-1))
 
 
-def unwrap(angle: Array, branch: float | Array) -> Array:
+def unwrap(angle: Array, branch: float | Array | Floats) -> Array:
     """Moves angles on (-pi, pi] to [branch, branch + 2 pi)."""
     return jnp.where(angle < branch, angle + 2 * jnp.pi, angle)

@@ -10,6 +10,10 @@ import numpy as np
 
 from sim.core import Floats, Ints
 
+VOID_BRANCH, WIDE_VOID_BRANCH = -np.pi / 4, np.pi / 2
+"""Void angles are unwrapped on [branch, branch + 2 pi): overlapping edges are slightly negative.
+The second branch is that of voids between slender units, beyond 315 deg in the initial lattice."""
+
 
 @dataclass(frozen=True)
 class Lattice:
@@ -89,6 +93,25 @@ class Lattice:
         """Gives the reference vector (n_ligaments, 2) of each ligament."""
         ends = self.vertices[self.ligaments]
         return ends[:, 1] - ends[:, 0]
+
+    @cached_property
+    def void_branch(self) -> Floats:
+        """Gives the least void angle (n_ligaments, 2) on each side of a ligament, rad.
+
+        That is negative, as units may overlap, but where the void is a wide one.
+        """
+        ahead = self.vertices[self.next_vertex] - self.vertices
+        behind = self.vertices[self.previous_vertex] - self.vertices
+        first, second = self.ligaments.T
+        angles = np.stack(
+            [_turn(behind[second], ahead[first]), _turn(behind[first], ahead[second])], axis=1
+        )
+        voids = np.where(angles < VOID_BRANCH, angles + 2 * np.pi, angles)
+        corners = _turn(ahead, behind)[self.ligaments] % (2 * np.pi)
+        # the voids and the corners go once round a ligament, or the smaller void is a turn short
+        short = np.rint((voids + corners).sum(axis=1) / (2 * np.pi)) < 1
+        voids[short, voids[short].argmin(axis=1)] += 2 * np.pi
+        return np.where(voids >= VOID_BRANCH + 2 * np.pi, WIDE_VOID_BRANCH, VOID_BRANCH)
 
     def positions(self, ids: Ints) -> Ints:
         """Finds the positions of units with the given ids in the arrays over units.
@@ -270,6 +293,12 @@ def _regular(
     along = np.stack([np.arctan2(y, x), np.arctan2(-y, -x)], axis=1)
     corner = np.cos(towards[pairs] - along[:, :, None]).argmax(axis=2)
     return replace(_network(polygons, corners * pairs + corner, index, spacing), site=site)
+
+
+def _turn(start: Floats, end: Floats) -> Floats:
+    """Measures angles (n,) from vectors to others, counter-clockwise, on (-pi, pi]."""
+    cross = start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]
+    return np.arctan2(cross, np.sum(start * end, axis=1))
 
 
 def _parity(i: int, j: int) -> float:

@@ -10,7 +10,7 @@ from shapely.affinity import rotate
 from sim.core import Floats
 from sim.structure import Lattice, displaced, void_angles
 from sim.structure.geometry import inertia
-from tests.sim.structures import mixed_polygons, rotating_squares
+from tests.sim.structures import hand_made, mixed_polygons, rotating_squares
 
 
 def perturbed(lattice: Lattice, size: float = 0.8) -> Floats:
@@ -66,6 +66,25 @@ def test_void_angles_of_rotating_squares() -> None:
     lattice = rotating_squares(3, bias_deg=20.0)
     angles = np.rad2deg(void_angles(lattice, lattice.vertices))
     np.testing.assert_allclose(np.sort(angles, axis=1), np.tile([50.0, 130.0], (12, 1)), atol=1e-9)
+
+
+def slender(degrees: float) -> Lattice:
+    """Two needles side by side, joined at their tips, whose other void is wide."""
+    half = np.deg2rad(degrees) / 2
+    long, broad = 10.0 * np.cos(half), 10.0 * np.sin(half)
+    needle = np.array([[0.0, 0.0], [long, -broad], [long, broad]])
+    c, s = np.cos(0.1), np.sin(0.1)
+    turns = np.array([[[c, -s], [s, c]], [[c, s], [-s, c]]])
+    return hand_made([needle @ turns[0], needle @ turns[1] + [0.0, 0.5]], np.array([[0, 3]]))
+
+
+def test_a_void_between_slender_units_reaches_beyond_315_degrees() -> None:
+    """Voids and corners at a ligament go once round; a narrow void may overlap all the same."""
+    for degrees in (2.0, 12.0):
+        lattice = slender(degrees)
+        narrow, wide = np.sort(np.rad2deg(void_angles(lattice, lattice.vertices))[0])
+        between = np.rad2deg(0.2)
+        assert (narrow, wide) == pytest.approx((between - degrees, 360 - between - degrees))
 
 
 @given(turn=st.floats(-90.0, 90.0))
