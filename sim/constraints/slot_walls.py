@@ -116,10 +116,11 @@ def slot_turn(angle: Array) -> Array:
 def slot_walls(lattice: Lattice) -> Ints:
     """Lists each slot with each farther edge of its unit, (n, 7) points: places of `SlotWall`."""
     every = slots(lattice)
-    _, mouth, before, *_ = every.T[..., None]
-    edges = np.arange(lattice.n_vertices)
-    farther = (lattice.unit[mouth] == lattice.unit) & (edges != mouth) & (edges != before)
-    slot, edge = np.nonzero(farther)
+    unit = lattice.unit[every[:, 1]]
+    slot, place = _counted(np.diff(lattice.first_vertex)[unit])
+    edge = lattice.first_vertex[unit[slot]] + place
+    farther = (edge != every[slot, 1]) & (edge != every[slot, 2])
+    slot, edge = slot[farther], edge[farther]
     return np.column_stack([every[slot], edge, lattice.next_vertex[edge]])
 
 
@@ -127,8 +128,18 @@ def slot_pairs(lattice: Lattice) -> Ints:
     """Lists the pairs of slots of a unit, (n, 10) points: places of `SlotGap`."""
     every = slots(lattice)
     unit = lattice.unit[every[:, 1]]
-    first, second = np.nonzero(np.triu(unit[:, None] == unit, 1))
-    return np.column_stack([every[first], every[second]])
+    order = np.argsort(unit, kind="stable")
+    end = np.searchsorted(unit[order], unit[order], side="right")
+    at, place = _counted(end - np.arange(len(unit)) - 1)
+    first, second = order[at], order[at + 1 + place]
+    ascending = np.lexsort((second, first))
+    return np.column_stack([every[first[ascending]], every[second[ascending]]])
+
+
+def _counted(counts: Ints) -> tuple[Ints, Ints]:
+    """Repeats each place as often as it counts; also numbers the repetitions, from zero."""
+    every = np.repeat(np.arange(len(counts)), counts)
+    return every, np.arange(len(every)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _along(slot: Array) -> Array:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from threading import Lock
 from typing import Any, NamedTuple
 
 import jax
@@ -206,6 +207,7 @@ class LoadLosses:
     ) -> None:
         self._scene, self.family, self._of_designs = scene, family, of_design
         self._octaves: dict[tuple[int, int], _Octave] = {}
+        self._making = Lock()
 
     def __call__(self, design: Floats, place: Floats) -> LoadLoss:
         """Computes the loss of a design (n_variables,) under the load at a place, with derivatives.
@@ -241,10 +243,11 @@ class LoadLosses:
     def _octave(self, place: Floats) -> _Octave:
         setup = self.family.setup(place)
         key = int(self.family.number(place)), setup.octave(place)
-        if key not in self._octaves:
-            own = self.family.setups[0].own_amplitude
-            self._octaves[key] = _Octave(self._scene, setup, key[1], own)
-        return self._octaves[key]
+        with self._making:  # losses are asked for from several threads, and an octave takes long
+            if key not in self._octaves:
+                own = self.family.setups[0].own_amplitude
+                self._octaves[key] = _Octave(self._scene, setup, key[1], own)
+            return self._octaves[key]
 
 
 class _Posed(NamedTuple):

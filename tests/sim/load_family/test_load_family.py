@@ -1,6 +1,8 @@
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from time import sleep
 
 import numpy as np
 import pytest
@@ -152,6 +154,25 @@ def test_octaves_count_from_the_highest_frequency() -> None:
     fastest = switched.fastest(1)
     assert isinstance(fastest, Harmonic)
     assert fastest == Harmonic(2.0, 8.0, 0.0, rise=0.1, delay=0.25)
+
+
+def test_threads_share_the_octave_that_one_of_them_makes(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = []
+
+    class Slow:
+        def __init__(self, *_: object) -> None:
+            made.append(self)
+            sleep(0.05)
+
+        def loss(self, *_: object) -> float:
+            return float(made.index(self))
+
+    monkeypatch.setattr("sim.load_family.family_losses._Octave", Slow)
+    losses = LoadLosses(scene(), SHAKEN, parameters_of_design(scene()))
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda _: losses.value(np.zeros(1), np.full(3, 0.5)), range(4)))
+    assert found == [0.0] * 4
+    assert len(made) == 1
 
 
 def bell(place: Floats) -> tuple[float, Floats]:
