@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 
 from pipeline import datasets, problem
 from pipeline.problem import Problem
+from pipeline.problem.sections import Kagome, Lattice
 from reports.base import Table, prose, style
 from reports.facts import headed
 from reports.page import FigureText, figure_page, publish, titled
@@ -87,7 +88,8 @@ def draw_spectrum(data: xr.Dataset, asked: Problem) -> Figure:
     )
     _transmission(style.place(figure, 13.0, below + 14.0, 70.0, 42.0), data, asked)
     style.letter(figure, 95.0, below, "c", "Waves in the intact lattice")
-    bands_panel(style.place(figure, 108.0, below + 14.0, 64.0, 42.0), data)
+    axes = style.place(figure, 108.0, below + 14.0, 64.0, 42.0)
+    bands_panel(axes, data, zone_points(asked.lattice))
     return figure
 
 
@@ -129,7 +131,13 @@ def _transmission(axes: Axes, data: xr.Dataset, asked: Problem) -> None:
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, columnspacing=1.0)
 
 
-def bands_panel(axes: Axes, data: xr.Dataset) -> None:
+def zone_points(lattice: Lattice) -> tuple[str, ...]:
+    """Names the points on the way round the zone of a lattice, by whether its cell is right-angled."""
+    angle = lattice.cell_angle if isinstance(lattice, Kagome) else np.pi / 2
+    return ("Γ", "X", "M", "Γ") if abs(np.cos(angle)) < 1e-9 else ("Γ", "M", "K", "Γ")
+
+
+def bands_panel(axes: Axes, data: xr.Dataset, points: tuple[str, ...]) -> None:
     """Draws the waves of the intact lattice, a colour for each compression."""
     place = data["wave"].values
     handles = []
@@ -143,7 +151,7 @@ def bands_panel(axes: Axes, data: xr.Dataset) -> None:
             else f"{100 * share:.3g} % shorter, {-100 * lateral:.2g} % narrower"
         )
         handles.append(Line2D([], [], color=colour, label=words))
-    axes.set_xticks(range(4), ["Γ", "X", "M", "Γ"])
+    axes.set_xticks(range(4), points)
     axes.grid(axis="x", color=style.PALE, linewidth=0.5)
     axes.set(ylabel="frequency (kHz)", xlim=(0, 3), ylim=(min(0.0, axes.get_ylim()[0]), None))
     axes.legend(

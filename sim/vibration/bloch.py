@@ -27,6 +27,8 @@ TOLERANCE = 1e-10
 STEPS, MAX_NEWTON = 20, 40
 CRUSHED = 0.5
 """Change of a ligament's length, as a share of it, from which on its law means nothing."""
+RIGHT = 1e-9
+"""Cosine of periods that counts as that of a right angle, and rounding of equal lengths."""
 
 
 class UnitCell(NamedTuple):
@@ -266,6 +268,8 @@ def _squares(cell: UnitCell, blocks: Floats, wave: Floats) -> Floats:
 def brillouin_path(cell: UnitCell, points: int) -> tuple[Floats, Ints]:
     """Spaces wave vectors (n, 2) from the zone's centre to a side, a corner, and back.
 
+    The points are Gamma X M Gamma where the periods are at a right angle, else Gamma M K Gamma.
+
     Args:
         cell: the unit cell.
         points: on each of the three legs.
@@ -273,7 +277,27 @@ def brillouin_path(cell: UnitCell, points: int) -> tuple[Floats, Ints]:
     Returns:
         the wave vectors in rad/mm, and the places (4,) of the named points among them.
     """
-    one, other = 2 * np.pi * np.linalg.inv(cell.period).T
-    corners = np.array([0 * one, one / 2, (one + other) / 2, 0 * one])
+    reciprocal = np.asarray(2 * np.pi * np.linalg.inv(cell.period).T, dtype=float)
+    one, corner = _side_and_corner(reciprocal)
+    corners = np.array([0 * one, one / 2, corner, 0 * one])
     legs = [np.linspace(a, b, points, endpoint=False) for a, b in pairwise(corners)]
     return np.concatenate([*legs, corners[-1:]]), np.arange(4) * points
+
+
+def _side_and_corner(reciprocal: Floats) -> tuple[Floats, Floats]:
+    """Finds a vector (2,) across a side of the zone, and a corner (2,) of that side.
+
+    The `reciprocal` vectors (2, 2) span the reciprocal lattice.
+    """
+    one, other = reciprocal
+    if abs(one @ other) <= RIGHT * np.linalg.norm(one) * np.linalg.norm(other):
+        return one, (one + other) / 2
+    while True:  # to the shortest vectors (Gauss), across the sides of the zone
+        if other @ other < one @ one * (1 - RIGHT):
+            one, other = other, one
+        if not (turns := np.rint(one @ other / (one @ one) * (1 - RIGHT))):
+            break
+        other = other - turns * one
+    # as far from the origin as from two neighbours at an acute angle
+    nearest = np.array([one, np.copysign(1.0, one @ other) * other])
+    return one, np.linalg.solve(nearest, (nearest**2).sum(axis=1) / 2)

@@ -4,7 +4,8 @@ import xarray as xr
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from reports.products.spectrum import bands_panel
+from pipeline.problem.sections import Kagome
+from reports.products.spectrum import bands_panel, zone_points
 
 
 def bands(shares: list[float]) -> xr.Dataset:
@@ -22,8 +23,16 @@ def bands(shares: list[float]) -> xr.Dataset:
 def test_every_compression_has_its_bands_and_its_colour(count: int) -> None:
     shares = (0.01 * np.arange(count)).tolist()
     axes = Figure().add_subplot()
-    bands_panel(axes, bands(shares))
+    bands_panel(axes, bands(shares), ("Γ", "X", "M", "Γ"))
     legend = axes.get_legend()
     assert legend is not None
     assert len(legend.get_texts()) == count
     assert len({to_hex(str(line.get_color())) for line in axes.lines}) == count
+
+
+@pytest.mark.parametrize(
+    ("angle", "wanted"), [(np.pi / 2, "Γ X M Γ"), (np.pi / 3, "Γ M K Γ")], ids=["right", "60 deg"]
+)
+def test_the_points_of_the_zone_are_named_by_its_shape(angle: float, wanted: str) -> None:
+    lattice = Kagome.model_construct(cell_angle=angle)
+    assert " ".join(zone_points(lattice)) == wanted

@@ -59,6 +59,19 @@ def test_strain_changes_the_bands_and_keeps_them_real(cell: UnitCell) -> None:
         strained(cell, np.diag([0.3, 0.0]), np.diag([0.0, 1.0]))
 
 
+@pytest.mark.parametrize("angle", [60.0, 75.0, 90.0, 120.0, 140.0])
+def test_the_corner_of_the_zone_is_as_near_to_three_wave_vectors(angle: float) -> None:
+    """As far from the origin as from two neighbours, and from none nearer: Wigner and Seitz's."""
+    period = 30.0 * np.array([[1.0, 0.0], [np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))]])
+    cell = made(*LATTICES[0])._replace(period=period)
+    waves, marks = brillouin_path(cell, 3)
+    grid = np.array([(a, b) for a in range(-3, 4) for b in range(-3, 4)])
+    others = grid @ (2 * np.pi * np.linalg.inv(period).T)
+    side, corner = (np.sort(np.linalg.norm(others - waves[marks[at]], axis=1)) for at in (1, 2))
+    assert side[0] == pytest.approx(side[1]) == pytest.approx(np.linalg.norm(waves[marks[1]]))
+    assert corner[0] == pytest.approx(corner[2]) == pytest.approx(np.linalg.norm(waves[marks[2]]))
+
+
 def test_a_lattice_that_does_not_repeat_has_no_cell() -> None:
     uneven = rotating_squares(6)
     corners: Floats = uneven.vertices.copy()
