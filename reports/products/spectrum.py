@@ -132,7 +132,7 @@ def _transmission(axes: Axes, data: xr.Dataset, asked: Problem) -> None:
 
 
 def zone_points(lattice: Lattice) -> tuple[str, ...]:
-    """Names the points on the way round the zone of a lattice, by whether its cell is right-angled."""
+    """Names the points on the way round the zone of a lattice, by the angle of its cell."""
     angle = lattice.cell_angle if isinstance(lattice, Kagome) else np.pi / 2
     return ("Γ", "X", "M", "Γ") if abs(np.cos(angle)) < 1e-9 else ("Γ", "M", "K", "Γ")
 
