@@ -126,7 +126,7 @@ def test_what_is_not_of_the_problem_is_left_out_or_refused(tmp_path: Path) -> No
     (tmp_path / "sweep").mkdir()
     left = [path.name for path in leftovers(study, tmp_path)]
     assert left == ["design_mma.nc", "response_partial.nc", "sweep.nc", "sweep"]
-    write("response", "response", "design")
+    write("response", "response", "fabricate")
     with pytest.raises(UserError, match="another problem than the study's") as told:
         leftovers(study, tmp_path)
     assert told.value.key == "problem_hash"
