@@ -87,7 +87,7 @@ def colour_bar(
     left, top, height = place
     bar = style.place(figure, left, top + 0.1 * height, 2.4, 0.8 * height)
     made = figure.colorbar(ScalarMappable(norm, colours), cax=bar, extend=extend)
-    made.set_label(label, labelpad=1.5)
+    made.set_label(label, labelpad=3.0)
     bar.tick_params(length=1.5)
     style.short_numbers(bar)
     return made
