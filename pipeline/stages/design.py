@@ -47,7 +47,7 @@ from sim.structure import overlapping_pairs, shape, smallest_gap
 LOG = logging.getLogger(__name__)
 
 NO_DESIGN = (InfeasibleStartError, SimulationError)
-"""Why a descent may end without a design, while others go on."""
+"""Errors that end one descent without a design, while others go on."""
 
 
 def work(args: argparse.Namespace) -> None:

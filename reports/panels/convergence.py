@@ -19,7 +19,7 @@ SIDES: tuple[tuple[tuple[float, float], dict[str, Any]], ...] = (
     ((0, -4.5), {"ha": "left", "va": "top"}),
     ((0, 4.5), {"ha": "right", "va": "bottom"}),
 )
-"""Where a number may stand beside its mark: shifts in points, and which corner is shifted."""
+"""Places of a number beside its mark: shifts in points, and which corner is shifted."""
 
 
 def loss_label(loss: xr.DataArray) -> str:

@@ -1,4 +1,4 @@
-"""What is found from a rendered or computed track is told as synthetic."""
+"""Tests that what is found from a rendered or computed track is told as synthetic."""
 
 from pathlib import Path
 

@@ -36,7 +36,7 @@ def begin() -> Iterator[Begin]:
 
 
 def test_a_run_needs_no_script_of_its_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Which begins with the folder that the environment was made in."""
+    """Begins with the folder that the environment was made in."""
     begun: list[list[str]] = []
     for name in ("check_problems", "_clear_the_ground", "_end_with_make"):
         monkeypatch.setattr(run, name, lambda *_: None)

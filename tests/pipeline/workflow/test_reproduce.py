@@ -69,7 +69,7 @@ def test_two_builds_are_compared(
 def test_a_build_elsewhere_leaves_no_picture_in_the_results(
     place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of its first look, which goes where the workflow runs."""
+    """Puts its first look where the workflow runs."""
     folders = []
 
     def show(_: object, cwd: Path, check: bool) -> subprocess.CompletedProcess[str]:

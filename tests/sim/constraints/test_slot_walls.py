@@ -1,4 +1,4 @@
-"""Which slots and edges of a unit are kept apart."""
+"""Tests which slots and edges of a unit are kept apart."""
 
 import numpy as np
 import pytest
