@@ -1,3 +1,4 @@
+from .angles import angle_between as angle_between
 from .contact_laws import ContactModel as ContactModel
 from .contact_laws import DistanceContact as DistanceContact
 from .contact_laws import VoidAngleContact as VoidAngleContact
@@ -15,7 +16,6 @@ from .gaps import displaced as displaced
 from .gaps import overlapping_pairs as overlapping_pairs
 from .gaps import polygons as polygons
 from .gaps import smallest_gap as smallest_gap
-from .geometry import angle_between as angle_between
 from .geometry import shape as shape
 from .geometry import unwrap as unwrap
 from .geometry import void_angles as void_angles

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from sim.core import Floats, Ints, Numbers
+from sim.structure.angles import angle_between
 from sim.structure.lattice import Lattice
 
 
@@ -95,12 +96,6 @@ def void_angles(lattice: Lattice | LatticeArrays, vertices: Numbers) -> Array:
     return unwrap(jnp.stack([one, other], axis=1), lattice.void_branch)
 
 
-def angle_between(start: Numbers, end: Numbers) -> Array:
-    """Measures the angle from ``start`` to ``end`` (..., 2), counter-clockwise, on (-pi, pi]."""
-    cross = start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]
-    return jnp.arctan2(cross, jnp.sum(start * end, axis=-1))
-
-
-def unwrap(angle: Array, branch: float | Array | Floats) -> Array:
+def unwrap(angle: Numbers, branch: float | Array | Floats) -> Array:
     """Moves angles on (-pi, pi] to [branch, branch + 2 pi)."""
     return jnp.where(angle < branch, angle + 2 * jnp.pi, angle)

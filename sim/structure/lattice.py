@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from sim.core import Floats, Ints
+from sim.structure.angles import angle_between
 
 VOID_BRANCH, WIDE_VOID_BRANCH = -np.pi / 4, np.pi / 2
 """Void angles are unwrapped on [branch, branch + 2 pi): overlapping edges are slightly negative.
@@ -104,10 +105,14 @@ class Lattice:
         behind = self.vertices[self.previous_vertex] - self.vertices
         first, second = self.ligaments.T
         angles = np.stack(
-            [_turn(behind[second], ahead[first]), _turn(behind[first], ahead[second])], axis=1
+            [
+                angle_between(behind[second], ahead[first]),
+                angle_between(behind[first], ahead[second]),
+            ],
+            axis=1,
         )
         voids = np.where(angles < VOID_BRANCH, angles + 2 * np.pi, angles)
-        corners = _turn(ahead, behind)[self.ligaments] % (2 * np.pi)
+        corners = angle_between(ahead, behind)[self.ligaments] % (2 * np.pi)
         # the voids and the corners go once round a ligament, or the smaller void is a turn short
         short = np.rint((voids + corners).sum(axis=1) / (2 * np.pi)) < 1
         voids[short, voids[short].argmin(axis=1)] += 2 * np.pi
@@ -293,12 +298,6 @@ def _regular(
     along = np.stack([np.arctan2(y, x), np.arctan2(-y, -x)], axis=1)
     corner = np.cos(towards[pairs] - along[:, :, None]).argmax(axis=2)
     return replace(_network(polygons, corners * pairs + corner, index, spacing), site=site)
-
-
-def _turn(start: Floats, end: Floats) -> Floats:
-    """Measures angles (n,) from vectors to others, counter-clockwise, on (-pi, pi]."""
-    cross = start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]
-    return np.arctan2(cross, np.sum(start * end, axis=1))
 
 
 def _parity(i: int, j: int) -> float:

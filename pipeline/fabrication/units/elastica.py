@@ -16,6 +16,7 @@ from numpy.polynomial import Polynomial
 from numpy.polynomial.legendre import Legendre, leggauss
 
 from sim.core import Floats
+from sim.structure import angle_between
 
 _TERMS = 10  # of the slope, beside the linear one
 _PARTS = 6  # in which the ends are turned
@@ -70,7 +71,7 @@ def strip_between(start: Floats, leaves: Floats, end: Floats, enters: Floats) ->
     """
     chord = end - start
     distance = float(np.linalg.norm(chord))
-    strip = bent_strip(*(float(signed_angle(chord, way)) for way in (leaves, enters)))
+    strip = bent_strip(*(float(angle_between(chord, way)) for way in (leaves, enters)))
     return BentStrip(strip.length * distance, strip.curvature / distance)
 
 
@@ -88,9 +89,3 @@ def _newton_step(start: float, end: float, unknowns: Floats) -> Floats:
     gradient = d_along * bending + along * d_bending + multiplier * d_across
     bordered = np.block([[hessian, d_across[:, None]], [d_across, np.zeros(1)]])
     return np.asarray(np.linalg.solve(bordered, -np.append(gradient, sine.sum())))
-
-
-def signed_angle(first: Floats, second: Floats) -> Floats:
-    """Measures angles (...) from vectors (..., 2) to others, rad, counter-clockwise."""
-    cross = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-    return np.asarray(np.arctan2(cross, (first * second).sum(axis=-1)))

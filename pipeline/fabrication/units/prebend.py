@@ -16,9 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.fabrication.parts import Slot
-from pipeline.fabrication.units.elastica import signed_angle, strip_between
+from pipeline.fabrication.units.elastica import strip_between
 from pipeline.problem.sections import Fabrication
 from sim.core import Floats
+from sim.structure import angle_between
 
 
 class PreBend(NamedTuple):
@@ -45,7 +46,7 @@ def prebend(first: Slot, second: Slot, settings: Fabrication) -> PreBend:
 def slot_angles(first: Slot, second: Slot) -> tuple[float, float]:
     """Measures the slots at both ends of a ligament against it, rad, counter-clockwise."""
     along = second.mouth - first.mouth
-    start, end = (float(signed_angle(along, way)) for way in _ways(first, second))
+    start, end = (float(angle_between(along, way)) for way in _ways(first, second))
     return start, end
 
 
@@ -72,5 +73,5 @@ def peak_curvature(start: Floats, leaves: Floats, end: Floats, enters: Floats) -
     """
     chord = end - start
     length = np.linalg.norm(chord, axis=-1)
-    a, b = signed_angle(chord, leaves), signed_angle(chord, enters)
+    a, b = angle_between(chord, leaves), angle_between(chord, enters)
     return np.asarray(np.maximum(np.abs(4 * a + 2 * b), np.abs(2 * a + 4 * b)) / length)

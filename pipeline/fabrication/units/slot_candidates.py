@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from pipeline.fabrication.parts import Slot
-from pipeline.fabrication.units.elastica import signed_angle
 from pipeline.fabrication.units.prebend import peak_curvature
 from pipeline.problem.sections import Fabrication
 from sim.constraints import slot_depth
 from sim.core import Floats, Ints
+from sim.structure import angle_between
 
 _slot_depth = jax.jit(slot_depth, static_argnums=0)
 _TURNS = np.deg2rad(np.arange(-85.0, 86.0, 5.0))
@@ -41,7 +41,7 @@ class Corner:
     def straight(self) -> bool:
         """Tests that a slot along the ligament leaves the shim straight, as far as is known."""
         other = self.other
-        return other is None or abs(signed_angle(-self.along, other.direction)) < _STRAIGHT
+        return other is None or abs(angle_between(-self.along, other.direction)) < _STRAIGHT
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def _turns_and_depths(
     slots = settings.slots
     depths = np.unique([*_depths(settings), _designed_depth(polygon, corner, settings)])
     _, ways = _ways(polygon, corner)
-    exact = [signed_angle(ways[slots.direction], way) for way in ways.values()]
+    exact = [angle_between(ways[slots.direction], way) for way in ways.values()]
     offered = np.unique(np.round([*_TURNS, *exact], 6)) if corner.turn is None else corner.turn
     turns, depths = np.meshgrid(offered, depths)
     return turns.ravel(), depths.ravel()

@@ -12,7 +12,6 @@ from pipeline.fabrication.checks.package_check import page_words
 from pipeline.fabrication.papers import read_bill
 from pipeline.fabrication.parts import Slot, UnbuildableUnitError, labels
 from pipeline.fabrication.units import build_specimen, end_angles, network, strip_between
-from pipeline.fabrication.units.elastica import signed_angle
 from pipeline.fabrication.units.prebend import peak_curvature, prebend
 from pipeline.fabrication.units.slot_candidates import Corner
 from pipeline.fabrication.units.slots import place_slots
@@ -22,7 +21,7 @@ from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.sections import Fabrication
 from sim.constraints import ConstraintVector, Limits
 from sim.core import Floats
-from sim.structure import Lattice, design_space, quads
+from sim.structure import Lattice, angle_between, design_space, quads
 from tests.pipeline.fabrication import built, handmade
 from tests.tables import some
 
@@ -91,7 +90,7 @@ def test_shims_are_as_long_as_they_lie_in_their_slots() -> None:
     other = replace(one, mouth=np.array([2.25, 0.0]), direction=way(60.0), truncation=0.2)
     found = prebend(one, other, Fabrication())
     chord = other.held - one.held
-    start, end = (float(signed_angle(chord, each)) for each in (way(-70.0), way(60.0)))
+    start, end = (float(angle_between(chord, each)) for each in (way(-70.0), way(60.0)))
     length, _ = elastica(start, end, float(np.linalg.norm(chord)))
     assert found.free == pytest.approx(length, rel=1e-4)
 
