@@ -21,11 +21,7 @@ from .geometry import unwrap as unwrap
 from .geometry import void_angles as void_angles
 from .lattice import VOID_BRANCH as VOID_BRANCH
 from .lattice import Lattice as Lattice
-from .lattice import honeycomb as honeycomb
-from .lattice import kagome as kagome
-from .lattice import listed as listed
-from .lattice import quads as quads
-from .lattice import triangular as triangular
+from .listed_lattice import listed as listed
 from .material import Material as Material
 from .material import damping_of_ratio as damping_of_ratio
 from .material import unrotated_inertia as unrotated_inertia
@@ -39,3 +35,7 @@ from .perturbation import Perturbation as Perturbation
 from .perturbation import PerturbedStructure as PerturbedStructure
 from .perturbation import draw_copies as draw_copies
 from .perturbation import perturbed as perturbed
+from .regular_lattices import honeycomb as honeycomb
+from .regular_lattices import kagome as kagome
+from .regular_lattices import quads as quads
+from .regular_lattices import triangular as triangular
