@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from io import BytesIO
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
@@ -19,6 +20,7 @@ from pipeline.runtime import UserError, read_bounded
 if TYPE_CHECKING:
     from shapely import Geometry
     from svgelements import Path as SvgPath
+    from svgelements import Shape
 
 DARK, LIGHT = 77, 178
 """Grey levels (of 255) below which a pixel is dark, and above which it is light."""
@@ -39,6 +41,8 @@ MOST_POINTS = 20_000
 SEGMENTS = 24  # chords of a curved piece of a path
 FARTHEST = 1e9
 """Coordinate of a drawing, in its own unit."""
+UNPAINTED = {"marker", "mask", "pattern", "symbol"}
+"""Elements of a drawing whose content is not painted where it stands, but where it is used."""
 
 
 def read_outlines(
@@ -135,8 +139,10 @@ def _dark(held: bytes, threshold: float | None, invert: bool) -> NDArray[np.uint
 def _of_drawing(path: Path, threshold: float | None, invert: bool) -> list[NDArray[Any]]:
     try:
         _check_depth(path)
-        _check_copies(ElementTree.parse(path).getroot())
-        shapes, paths = _parsed(path)
+        drawing = ElementTree.parse(path).getroot()
+        _check_copies(drawing)
+        _set_aside(drawing)
+        shapes, paths = _parsed(drawing)
         _check_outlines(shapes, paths)
         count = min(SEGMENTS, MOST_POINTS // max(1, sum(map(len, paths))))
         if count < 2:
@@ -152,14 +158,34 @@ def _of_drawing(path: Path, threshold: float | None, invert: bool) -> list[NDArr
     return _painted([*map(_Painted, shown, map(_is_filled, paths), drawn)])
 
 
-def _is_filled(path: SvgPath) -> bool:
-    return path.fill is not None and path.fill.value is not None
+def _is_seen(shape: Shape) -> bool:
+    """Tells a shape that has a fill or a stroke, and is not wholly transparent."""
+    told = shape.values
+    if told.get("visibility") in ("hidden", "collapse") or _is_zero(told.get("opacity")):
+        return False
+    return _is_filled(shape) or (shape.stroke_width != 0.0 and _paints(shape, "stroke"))
+
+
+def _is_filled(shape: Shape) -> bool:
+    return _paints(shape, "fill")
+
+
+def _paints(shape: Shape, kind: str) -> bool:
+    colour = getattr(shape, kind)
+    if colour is None or colour.value is None or colour.alpha == 0:
+        return False
+    return not _is_zero(shape.values.get(f"{kind}-opacity"))
+
+
+def _is_zero(share: str | None) -> bool:
+    return re.fullmatch(r"\s*[+-]?(0+\.?0*|\.0+)%?\s*", share or "") is not None
 
 
 def _grey(path: SvgPath) -> float:
     """Returns the grey level, of 255, of a path's fill, or else of its stroke, black without."""
-    for paint in (path.fill, path.stroke):
-        if paint is not None and paint.value is not None and paint.alpha:
+    for kind in ("fill", "stroke"):
+        if _paints(path, kind):
+            paint = getattr(path, kind)
             return (paint.red + paint.green + paint.blue) / 3
     return 0.0
 
@@ -209,14 +235,16 @@ def _areas(paths: list[_Painted]) -> list[Geometry]:
     ]
 
 
-def _parsed(path: Path) -> tuple[list[Any], list[SvgPath]]:
-    """Returns the elements of a drawing, and those that have an outline as paths."""
+def _parsed(drawing: ElementTree.Element) -> tuple[list[Any], list[SvgPath]]:
+    """Returns the elements of a drawing, and those that are seen and have an outline as paths."""
     from svgelements import SVG, Shape
     from svgelements import Path as Curve
 
     try:
-        elements = list(SVG.parse(str(path), reify=True).elements())
-        return elements, [Curve(each) for each in elements if isinstance(each, Shape)]
+        held = BytesIO(ElementTree.tostring(drawing))
+        elements = list(SVG.parse(held, reify=True).elements())
+        shapes = (each for each in elements if isinstance(each, Shape))
+        return elements, [Curve(each) for each in shapes if _is_seen(each)]
     except Exception as error:  # whatever a parser of another project meets in a damaged file
         raise ValueError(f"{type(error).__name__}: {error}") from error
 
@@ -265,6 +293,16 @@ def _check_copies(drawing: ElementTree.Element) -> None:
         shown = named.get(link.removeprefix("#"))
         if shown is not None and any(map(_is_copy, shown.iter())):
             raise ValueError("copies (use) of copies")
+
+
+def _set_aside(drawing: ElementTree.Element) -> None:
+    """Moves to definitions what is not painted where it stands."""
+    for above in list(drawing.iter()):
+        for place, element in enumerate(above):
+            space, brace, name = element.tag.rpartition("}")
+            if name in UNPAINTED:
+                above[place] = ElementTree.Element(f"{space}{brace}defs")
+                above[place].append(element)
 
 
 def _is_copy(element: ElementTree.Element) -> bool:

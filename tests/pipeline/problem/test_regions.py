@@ -111,6 +111,26 @@ def test_fills_that_overlap_are_one(drawn: str, inside: list[bool], tmp_path: Pa
     assert find_inside(points, read_outlines(path), 1e-9) == inside
 
 
+@cases("problem", "hidden")
+def test_what_is_not_seen_is_no_shape(hidden: str, tmp_path: Path) -> None:
+    """As the frame of an icon: it is seen neither before nor after what is."""
+    path = tmp_path / "l.svg"
+    head = '<svg xmlns="http://www.w3.org/2000/svg" width="24" height="24">'
+    kite = '<path d="M12 2 L20 9 L12 22 L4 9 Z"/>'
+    path.write_text(f"{head}{kite}</svg>")
+    alone = read_outlines(path)
+    for drawn in (hidden + kite, kite + hidden):
+        path.write_text(f"{head}{drawn}</svg>")
+        assert read_outlines(path) == alone
+
+
+def test_a_symbol_is_seen_where_it_is_used(tmp_path: Path) -> None:
+    path = tmp_path / "l.svg"
+    square = '<symbol id="a"><rect width="9" height="9"/></symbol><use href="#a" x="10"/>'
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg">{square}</svg>')
+    np.testing.assert_allclose(box(read_outlines(path)), [[10, -9], [19, 0]])
+
+
 GROUND = '<rect width="100" height="100" fill="{}"/>'
 LETTER = '<path fill="{}" d="M30 20 h15 v45 h25 v15 h-40 z"/>'
 
