@@ -168,7 +168,7 @@ def explain_error(
 ) -> UserError:
     """Explains the first error of validation; `data` is the document with its preset."""
     first, *others = error.errors(include_url=False)
-    keys = _real_keys(first["loc"], data, missing=first["type"] == "missing")
+    keys = _real_keys(first["loc"], data, missing=_is_missing_key(first))
     what, remedy, key = _in_words(first)
     if key is not None:
         keys = (*keys, key)
@@ -212,8 +212,15 @@ def _in_words(error: ErrorDetails) -> tuple[str, str, str | None]:
     context = error.get("ctx", {})
     if error["type"] == "problem":
         return context["what"], context["remedy"], context["key"]
+    if error["type"] == "missing" and not _is_missing_key(error):
+        return "too few items", "write it as [first, second]", None
     what, remedy = _WORDS.get(error["type"], (error["msg"], "correct the value"))
     return what, remedy.format_map(context), None
+
+
+def _is_missing_key(error: ErrorDetails) -> bool:
+    """Tells a key that is missing from an item that is, of which the list is to blame."""
+    return error["type"] == "missing" and isinstance(error["loc"][-1], str)
 
 
 def _real_keys(location: KeyPath, data: object, *, missing: bool) -> KeyPath:

@@ -30,7 +30,8 @@ def test_a_preset_shows_those_that_name_it(folder: Path) -> None:
     assert shown(folder, "study@other") == []
     assert shown(folder, "another") == []
     (folder / "broken.yaml").write_text("structure: [")  # its stage will tell why
-    assert shown(folder, "study@quick") == ["broken", "cloaked"]
+    (folder / "short.yaml").write_text("structure: cloaked\nvirtual: { camera: { image: [720] } }\n")
+    assert shown(folder, "study@quick") == ["broken", "cloaked", "short"]
 
 
 def test_a_film_takes_the_place_of_the_virtual_one_of_its_kind(folder: Path) -> None:
