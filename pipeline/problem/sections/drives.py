@@ -351,8 +351,15 @@ class SeveralDrives(Section):
 
     @property
     def case_weights(self) -> tuple[float, ...]:
-        """Computes the weight of each load case in the loss."""
-        return max((drive.case_weights for drive in self.drives), key=len)
+        """Computes the weight of each load case in the loss: those that a drive gives, or equal."""
+        given = self._given_weights
+        return given[0] if given else max((each.case_weights for each in self.drives), key=len)
+
+    @property
+    def _given_weights(self) -> list[tuple[float, ...]]:
+        """Lists the different weights that drives of several directions give."""
+        words = (getattr(drive, "weights", None) for drive in self.drives)
+        return list(dict.fromkeys(each for each in words if each is not None and len(each) > 1))
 
     @model_validator(mode="after")
     def _cases_agree(self) -> Self:
@@ -360,6 +367,9 @@ class SeveralDrives(Section):
         if len(counts) > 1:
             what = f"drives of {' and '.join(map(str, sorted(counts)))} directions act at once"
             raise fault(what, "give each one direction, or as many as the others", "drives")
+        if len(given := self._given_weights) > 1:
+            what = f"the load cases have weights {given[0]} by one drive and {given[1]} by another"
+            raise fault(what, "give the weights once: the drives share their load cases", "drives")
         return self
 
 

@@ -70,6 +70,19 @@ def test_several_drives_act_at_once_in_all_directions(tmp_path: Path) -> None:
     np.testing.assert_allclose(ends, [[-0.1, 0.0], [0.0, 0.1]], atol=1e-12)
 
 
+def test_load_cases_have_the_weights_that_any_drive_gives(tmp_path: Path) -> None:
+    two = "kind: force, amplitude: 5 N, directions: [180 deg, 90 deg]"
+    first = f"{{ {two}, units: right }}"
+    weighted = f"{{ {two}, units: {{ units: [[2, 0]] }}, weights: [0.9, 0.1] }}"
+    for drives in ((first, weighted), (weighted, first), (weighted, PUSH)):
+        asked = load(written(tmp_path, "drives:\n" + "".join(f"  - {each}\n" for each in drives)))
+        assert asked.drive.case_weights == (0.9, 0.1)
+    other = first.replace(" }", ", weights: [0.5, 0.5] }")
+    path = written(tmp_path, f"drives:\n  - {other}\n  - {weighted}")
+    with refused("(0.5, 0.5) by one drive and (0.9, 0.1) by another", "drives", "once"):
+        load(path)
+
+
 RAMP = (
     "{ kind: linear_ramp, units: right, amplitude: 9 mm, duration: 1 s, direction: 180 deg,"
     " free: [uy] }"

@@ -30,7 +30,9 @@ def test_a_preset_shows_those_that_name_it(folder: Path) -> None:
     assert shown(folder, "study@other") == []
     assert shown(folder, "another") == []
     (folder / "broken.yaml").write_text("structure: [")  # its stage will tell why
-    (folder / "short.yaml").write_text("structure: cloaked\nvirtual: { camera: { image: [720] } }\n")
+    (folder / "short.yaml").write_text(
+        "structure: cloaked\nvirtual: { camera: { image: [720] } }\n"
+    )
     assert shown(folder, "study@quick") == ["broken", "cloaked", "short"]
 
 
