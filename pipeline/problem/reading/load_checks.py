@@ -9,6 +9,7 @@ from pipeline.problem.reading.fault import Findings, ProblemFault
 from pipeline.problem.reading.yaml_file import KeyPath
 from pipeline.problem.sections import (
     DisplacementDrive,
+    ForceDrive,
     LinearRampDrive,
     ListedNetwork,
     LoadRanges,
@@ -17,6 +18,7 @@ from pipeline.problem.sections import (
     SingleDrive,
     TanhRampDrive,
     TestSetup,
+    TorqueDrive,
     selected_units,
     single_drives,
 )
@@ -73,6 +75,19 @@ def _contested(one: SingleDrive, other: SingleDrive) -> str | None:
     held = [{"ux", "uy", "theta"} - set(drive.free) for drive in (one, other)]
     moved = [set(drive.acting) for drive in (one, other)]
     return min(held[0] & moved[1] | held[1] & moved[0], default=None)
+
+
+def prescribed_units(problem: Problem) -> set[int]:
+    """Lists the ids of units of which no degree of freedom is left: clamped, or displaced."""
+    held = [(support.units, set(support.clamp)) for support in problem.supports]
+    for drive in single_drives(problem.drive):
+        gives_way = drive.acting if isinstance(drive, ForceDrive | TorqueDrive) else ()
+        held.append((drive.units, set(drive.prescribed) - set(gives_way)))
+    found: dict[int, set[str]] = {}
+    for selector, dofs in held:
+        for unit in selected_units(selector, problem.lattice):
+            found.setdefault(unit, set()).update(dofs)
+    return {unit for unit, dofs in found.items() if len(dofs) == 3}
 
 
 def one_kind_of_load(problem: Problem) -> Findings:

@@ -2,7 +2,7 @@
 
 from pipeline.problem import Problem, cloak_units, inclusion_units, interest_units, void_units
 from pipeline.problem.reading.fault import Findings, ProblemFault
-from pipeline.problem.reading.load_checks import selectors_of
+from pipeline.problem.reading.load_checks import prescribed_units, selectors_of
 from pipeline.problem.reading.yaml_file import KeyPath
 from pipeline.problem.sections import (
     ListedNetwork,
@@ -59,13 +59,25 @@ def _cloak(problem: Problem) -> Findings:
 def _interest(problem: Problem) -> Findings:
     if isinstance(problem.objective.region, Region):
         yield from _region_fits(problem, problem.objective.region, ("objective", "region"))
-    if interest_units(problem):
+    if not (looked_at := set(interest_units(problem))):
+        what = "no unit lies in the region of interest"
+    elif _is_decided(problem, looked_at):
+        what = (
+            "clamps and drives prescribe the motion of all units of interest: no design alters it"
+        )
+    else:
         return
-    what = "no unit lies in the region of interest"
     if problem.objective.region == "surroundings":
         yield ProblemFault(what, ("cloak",), "leave units outside it")
     else:
         yield ProblemFault(what, ("objective", "region"), "enlarge it, or move its centre")
+
+
+def _is_decided(problem: Problem, looked_at: set[int]) -> bool:
+    """Tells motions that are compared, and are the same for every design."""
+    objective = problem.objective
+    compared = objective.kind == "displacement" and objective.reaction is None
+    return compared and looked_at <= prescribed_units(problem)
 
 
 def void(problem: Problem) -> Findings:

@@ -30,6 +30,7 @@ from pipeline.problem.sections.selectors import Selector
 
 _SUM_TOLERANCE = 1e-6
 Dof = Literal["ux", "uy", "theta"]
+_DOFS: tuple[Dof, ...] = ("ux", "uy", "theta")
 
 
 class Support(Section):
@@ -41,7 +42,7 @@ class Support(Section):
     """
 
     units: Selector
-    clamp: Annotated[tuple[Dof, ...], Field(min_length=1)] = ("ux", "uy", "theta")
+    clamp: Annotated[tuple[Dof, ...], Field(min_length=1)] = _DOFS
 
 
 class _Drive(Section):
@@ -68,6 +69,11 @@ class _Drive(Section):
     def acting(self) -> tuple[Dof, ...]:
         """Lists the degrees of freedom that the drive moves in some load case."""
         return ("theta",)
+
+    @property
+    def prescribed(self) -> tuple[Dof, ...]:
+        """Lists the degrees of freedom whose motion the drive gives, be it none."""
+        return tuple(dof for dof in _DOFS if dof not in self.free)
 
     @model_validator(mode="before")
     @classmethod
@@ -311,8 +317,7 @@ class TimeSeriesDrive(_Drive):
     @property
     def acting(self) -> tuple[Dof, ...]:
         """Lists the degrees of freedom that the drive moves."""
-        every: tuple[Dof, ...] = ("ux", "uy", "theta")
-        return tuple(dof for dof in every if dof not in self.free)
+        return self.prescribed
 
 
 SingleDrive = (

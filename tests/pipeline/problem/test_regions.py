@@ -7,7 +7,14 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.problem import canonical_json, cloak_units, content_hash, from_canonical, void_units
+from pipeline.problem import (
+    canonical_json,
+    cloak_units,
+    content_hash,
+    from_canonical,
+    interest_units,
+    void_units,
+)
 from pipeline.problem.outlines import Outline, extents, find_inside, read_outlines
 from pipeline.problem.reading import load
 from pipeline.runtime import UserError
@@ -226,6 +233,19 @@ def test_a_cloak_around_the_void(tmp_path: Path) -> None:
     around = load(write(tmp_path, f"{disc}cloak: {{ around: {{ distance: 50.1 mm }} }}\n{MIMIC}"))
     round_one = load(write(tmp_path, f"{disc}cloak: {{ disc: {{ radius: 90 mm }} }}\n{MIMIC}"))
     assert cloak_units(around) == cloak_units(round_one)
+
+
+def test_a_cloak_leaves_units_that_a_design_can_move(tmp_path: Path) -> None:
+    """Driven units move as the drive does: a loss over them alone is zero."""
+    wide = "void: { disc: { radius: 40 mm } }\ncloak: { around: { distance: 1 m } }\n"
+    with refused("prescribe the motion of all units of interest", "cloak", "outside it"):
+        load(write(tmp_path, wide + MIMIC))
+    path = write(tmp_path, wide + MIMIC)
+    text = path.read_text()
+    path.write_text(text.replace("  directions", "  free: [uy]\n  directions"))
+    assert len(interest_units(load(path))) == 15
+    path.write_text(text.replace("intact", "intact, reaction: 1"))
+    assert load(path).objective.reaction == 1.0
 
 
 def test_the_problem_holds_what_the_image_showed(tmp_path: Path) -> None:
