@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.problem.sections import SeveralDrives, TimeSeriesDrive, single_drives
 from pipeline.runtime import UserError
 
 if TYPE_CHECKING:
@@ -50,8 +51,15 @@ def unconfirmed(error: UnconfirmedError, asked: Problem, source: Path) -> UserEr
     """Explains that the path as it is reported confirms none of the designs tried."""
     remedy = "raise it, so that the optimiser sees what the reported path sees"
     if asked.objective.snap == "avoid":
-        remedy += "; or begin elsewhere (optimiser.start), or lower drive.amplitude"
+        remedy += f"; or begin elsewhere (optimiser.start), or lower {_key_of_size(asked)}"
     return UserError(str(error), file=source, key="horizon.steps", remedy=remedy)
+
+
+def _key_of_size(asked: Problem) -> str:
+    """Names the key that says how large the drive is, of several the first one's."""
+    first = single_drives(asked.drive)[0]
+    above = "drives[0]" if isinstance(asked.drive, SeveralDrives) else "drive"
+    return f"{above}.file" if isinstance(first, TimeSeriesDrive) else f"{above}.amplitude"
 
 
 class StoppedError(Exception):
@@ -70,13 +78,15 @@ class StoppedError(Exception):
         super().__init__(str(error))
         self.error, self.scene, self.name, self.asked = error, scene, name, asked
 
-    def explain(self, source: Path, kept: Path | None = None) -> UserError:
+    def explain(self, asked: Problem, source: Path, kept: Path | None = None) -> UserError:
         """Explains it to the user of a problem file; the dataset `kept` has what was reached."""
-        remedy = "lower drive.amplitude, or ask for solver.accuracy: tight"
+        key = _key_of_size(asked)
+        lower = f"scale the motion in {key} down" if key.endswith("file") else f"lower {key}"
+        remedy = f"{lower}, or ask for solver.accuracy: tight"
         if kept is not None:
             remedy += f"; all up to there is in {kept}"
         what = f"the {self.name} structure cannot be simulated{self._place()}: {self.error}"
-        return UserError(what, file=source, key="drive.amplitude", remedy=remedy)
+        return UserError(what, file=source, key=key, remedy=remedy)
 
     def _place(self) -> str:
         """Describes up to which load it was followed, and where to look."""

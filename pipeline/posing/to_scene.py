@@ -326,4 +326,7 @@ def _measured(path: Path) -> loads.TimeSeries:
     if (np.diff(table[:, 0]) <= 0).any():
         remedy = "sort it by time, each time once"
         raise UserError("the measured drive needs ascending times", file=path, remedy=remedy)
+    if not table[:, 1:].any():
+        remedy = "give a motion: the loss is a share of the one it causes"
+        raise UserError("the measured drive moves nothing", file=path, remedy=remedy)
     return loads.TimeSeries(table[:, 0], table[:, 1:])

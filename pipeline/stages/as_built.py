@@ -46,10 +46,10 @@ def work(args: argparse.Namespace) -> None:
         raise
     except SimulationError as error:
         stopped = StoppedError(error, posed[name].scene, f"{name} (as built)", np.zeros(0))
-        raise stopped.explain(args.problem) from error
+        raise stopped.explain(asked, args.problem) from error
     except StoppedError as stopped:
         stopped.name = f"{stopped.name} (as built)"
-        raise stopped.explain(args.problem) from stopped
+        raise stopped.explain(asked, args.problem) from stopped
     for name, each in angles.items():
         plans[name]["warnings"] += bent_warning(name, each)
     origin = provenance.of_study(asked, "as_built", parents={"design": args.design}, plan=plans)

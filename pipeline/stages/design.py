@@ -201,7 +201,7 @@ def optimise(
         except SimulationError as error:
             name = "initial" if start is None else "starting"
             stopped = failures.StoppedError(error, scene, name, plan.solver.output_times)
-            raise stopped.explain(source) from error
+            raise stopped.explain(asked, source) from error
         except JournalInUseError as error:
             raise UserError(str(error), file=source) from error
 

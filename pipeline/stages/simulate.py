@@ -50,7 +50,7 @@ def work(args: argparse.Namespace) -> None:
         made, plans = response_dataset(asked, structures, args.threads)
     except StoppedError as stopped:
         kept = _keep(asked, structures, stopped, args)
-        raise stopped.explain(args.problem, kept) from stopped
+        raise stopped.explain(asked, args.problem, kept) from stopped
     origin = provenance.of_study(asked, "simulate", parents=_parents(args), plan=plans)
     datasets.write(made, args.out, "response", origin)
 

@@ -61,7 +61,7 @@ def work(args: argparse.Namespace) -> None:
         error.file = error.file or str(args.problem)
         raise
     except StoppedError as stopped:
-        raise stopped.explain(args.problem) from stopped
+        raise stopped.explain(asked, args.problem) from stopped
     origin = provenance.of_study(asked, "spectrum", parents={"design": args.design})
     datasets.write(made, args.out, "spectrum", origin)
 

@@ -46,7 +46,7 @@ def work(args: argparse.Namespace) -> None:
     try:
         made = checks(asked, args.problem.parent, design, args.threads)
     except StoppedError as stopped:
-        raise stopped.explain(args.problem) from stopped
+        raise stopped.explain(asked, args.problem) from stopped
     origin = provenance.of_study(asked, "verify", parents={"design": args.design})
     datasets.write(made, args.out, "verification", origin)
 

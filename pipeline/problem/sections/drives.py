@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field, GetJsonSchemaHandler, StringConstraints, model_validator
+from pydantic import AfterValidator, Field, GetJsonSchemaHandler, StringConstraints, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
@@ -31,6 +31,12 @@ from pipeline.problem.sections.selectors import Selector
 _SUM_TOLERANCE = 1e-6
 Dof = Literal["ux", "uy", "theta"]
 _DOFS: tuple[Dof, ...] = ("ux", "uy", "theta")
+
+
+def _moves(amplitude: float) -> float:
+    if amplitude == 0.0:
+        raise fault("a drive of zero moves nothing", "give an amplitude above or below zero")
+    return amplitude
 
 
 class Support(Section):
@@ -279,7 +285,7 @@ class TorqueDrive(_Course, _Drive):
 
     unit: ClassVar[str] = "N mm"
     kind: Literal["torque"]
-    amplitude: Moment
+    amplitude: Annotated[Moment, AfterValidator(_moves)]
 
 
 class RotationDrive(_Course, _Drive):
@@ -293,7 +299,7 @@ class RotationDrive(_Course, _Drive):
 
     unit: ClassVar[str] = "rad"
     kind: Literal["rotation"]
-    amplitude: Angle
+    amplitude: Annotated[Angle, AfterValidator(_moves)]
 
 
 class TimeSeriesDrive(_Drive):

@@ -3,16 +3,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.posing import scene_of
+from pipeline.posing import StoppedError, scene_of
 from pipeline.problem import from_canonical, load
 from pipeline.problem.identity import canonical_json
 from pipeline.runtime import UserError
+from sim.core import SimulationError
 from sim.scene import Scene, simulate
 from tests.pipeline import static
 from tests.tables import cases, refused
 
 PUSH = "{ kind: force, units: right, amplitude: 0.5 N, direction: 180 deg, free: [uy] }"
 TURN = "{ kind: rotation, units: { units: [[2, 0]] }, amplitude: 10 deg }"
+TIMES = np.array([0.5, 1.0])
 RIGHT = [4, 9, 14, 19, 24]
 
 
@@ -160,6 +162,17 @@ def test_what_has_no_meaning_is_refused(tmp_path: Path, drive: str, words: tuple
     with pytest.raises(UserError) as told:
         load(written(tmp_path, drive))
     assert all(word in str(told.value) for word in words), told.value
+
+
+@cases("posing", "drive, key")
+def test_a_stop_blames_the_size_of_the_drive(tmp_path: Path, drive: str, key: str) -> None:
+    series = "time (s),ux (mm),uy (mm),theta (rad)\n0,0,0,0\n2,1,0,0\n"
+    (tmp_path / "push.csv").write_text(series)
+    asked = load(path := written(tmp_path, drive, "duration: 1 s, samples: 5"))
+    stopped = StoppedError(SimulationError("stuck"), scene_of(asked, tmp_path), "altered", TIMES)
+    told = stopped.explain(asked, path)
+    assert told.key == key
+    assert key in str(told.remedy)
 
 
 def test_forces_on_what_nothing_holds_are_refused(tmp_path: Path) -> None:
