@@ -31,7 +31,7 @@ from pipeline.problem.sections import (
 )
 from pipeline.runtime import UserError
 from sim.constraints import Limits
-from sim.core import Numbers
+from sim.core import Floats, Numbers
 from sim.energy import activation_distance
 from sim.scene import (
     DOFS,
@@ -236,18 +236,38 @@ def material_of(problem: Problem, lattice: Lattice) -> Material:
 
 def _stiffnesses(problem: Problem, lattice: Lattice) -> Sequence[float | Numbers]:
     """Reads axial, shear and bending stiffness, arrays where a file lists the ligaments."""
-    given = problem.material
-    alike: Sequence[float | Numbers] = [getattr(given, name) for name in STIFFNESSES]
+    alike = _shim_stiffnesses(problem, lattice)
     if not isinstance(problem.lattice, ListedNetwork):
         return alike
-    if given.foil is not None:
-        alike = given.foil.foil.stiffness(np.linalg.norm(lattice.ligament_vectors, axis=1))
     if (listed := problem.lattice.stiffnesses) is None:
         return alike
     intact = lattice_of(problem)
     kept = np.isin(intact.id[intact.ligament_units], lattice.id).all(axis=1)
     own = np.array(listed, dtype=float)[kept].T  # NaN where the file gives none
     return [np.where(np.isnan(each), other, each) for each, other in zip(own, alike, strict=True)]
+
+
+def _shim_stiffnesses(problem: Problem, lattice: Lattice) -> Sequence[float | Numbers]:
+    """Reads the three stiffnesses of ligaments that neither a file nor an inclusion alters."""
+    given = problem.material
+    if isinstance(problem.lattice, ListedNetwork) and given.foil is not None:
+        return given.foil.foil.stiffness(np.linalg.norm(lattice.ligament_vectors, axis=1))
+    return [getattr(given, name) for name in STIFFNESSES]
+
+
+def stiffness_factors(problem: Problem, structure: str) -> Floats:
+    """Divides the stiffness of ligaments by that of shims: axial, shear, bending (n_ligaments, 3).
+
+    The structure is "intact", "altered" or "cloaked"; only in the last two an inclusion is stiff.
+    """
+    intact = structure == "intact"
+    lattice = lattice_of(problem) if intact else altered_lattice_of(problem)
+    material = material_of(problem, lattice) if intact else _stiffened(problem, lattice)
+    factors = [
+        getattr(material, name) / np.broadcast_to(shim, lattice.ligament_units.shape[:1])
+        for name, shim in zip(STIFFNESSES, _shim_stiffnesses(problem, lattice), strict=True)
+    ]
+    return np.stack(factors, axis=1)
 
 
 def _stiffened(problem: Problem, lattice: Lattice) -> Material:

@@ -13,11 +13,24 @@ import numpy as np
 from pipeline import datasets, problem
 from pipeline.fabrication.checks import STEPS, check_package
 from pipeline.fabrication.files import PackageFolder
-from pipeline.fabrication.papers import bill_rows, write_assembly_sheet, write_bill, write_manifest
+from pipeline.fabrication.papers import (
+    bill_rows,
+    stiffness_words,
+    write_assembly_sheet,
+    write_bill,
+    write_manifest,
+)
 from pipeline.fabrication.parts import THIN_WALL, BuiltSpecimen, UnbuildableUnitError
 from pipeline.fabrication.readback import draw
 from pipeline.fabrication.units import build_specimen, network, summary
-from pipeline.posing import designed_angles, free_dofs, read_design, scene_of, structures_of
+from pipeline.posing import (
+    designed_angles,
+    free_dofs,
+    read_design,
+    scene_of,
+    stiffness_factors,
+    structures_of,
+)
 from pipeline.problem import Problem
 from pipeline.runtime import cli, write_folder_atomically
 from sim.core import SimulationError
@@ -47,7 +60,13 @@ def work(args: argparse.Namespace) -> None:
         with _picture_of_fault(pictures):
             built = build_specimen(net, settings, names, args.design, bar.update)
         free = {net.labels[n]: dofs for n, dofs in free_dofs(scene).items() if n in net.labels}
-        specimen = replace(built, free_dofs=free)
+        factors = stiffness_factors(posed, args.structure)
+        other = {
+            ligament.number: tuple(each)
+            for ligament, each in zip(built.ligaments, factors.tolist(), strict=True)
+            if not np.allclose(each, 1.0)
+        }
+        specimen = replace(built, free_dofs=free, stiffness=other)
         package = PackageFolder(room, specimen, posed, str(args.problem), bar.update)
         package.write()
         write_assembly_sheet(room / "assembly.pdf", specimen, settings)
@@ -65,6 +84,10 @@ def work(args: argparse.Namespace) -> None:
     if words := specimen.free_words:
         what = f"the study leaves free {words}, but the fixtures hold these units in every way"
         LOG.warning("%s: %s; guides for them are yours to make", args.out_dir, what)
+    if words := stiffness_words(specimen):
+        what = f"the study simulates {len(specimen.stiffness)} joints otherwise than with shims"
+        remedy = "make them so (glue or screw stiffer ones), or it is another structure"
+        LOG.warning("%s: %s (%s); %s", args.out_dir, what, words, remedy)
     if (worse := loss_warning(simulated or {})) is not None:
         LOG.warning("%s: %s", args.out_dir, worse)
 

@@ -3,6 +3,7 @@ from .bill_of_materials import BILL as BILL
 from .bill_of_materials import bill_rows as bill_rows
 from .bill_of_materials import read_bill as read_bill
 from .bill_of_materials import write_bill as write_bill
+from .joint_stiffness import stiffness_words as stiffness_words
 from .manifest import MANIFEST as MANIFEST
 from .manifest import read_manifest as read_manifest
 from .manifest import write_manifest as write_manifest

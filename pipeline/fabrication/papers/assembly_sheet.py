@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.fabrication.papers.assembly_plan import TONES, WORST, AssemblyPlan, Tile, tiles
+from pipeline.fabrication.papers.joint_stiffness import stiffness_words
 from pipeline.fabrication.papers.pdf_paper import BOLD, GREY, INK, POINT, SIGNAL, PdfDocument
 from pipeline.fabrication.parts import SHIM_PLAY, BuiltSpecimen
 from pipeline.problem.sections import Fabrication
@@ -216,6 +217,12 @@ def assembly_steps(
             f"The study leaves free {specimen.free_words}; pads, grips and adapters hold these "
             "units in every way. Let them slide or turn in guides of your own instead, or the "
             "specimen is another structure than was simulated."
+        )
+    if words := stiffness_words(specimen):
+        steps.append(
+            f"The study simulates joints stiffer or softer than their shims ({words}). Make them "
+            "so, a stiffer one by gluing or screwing its units together, or the specimen is "
+            "another structure than was simulated."
         )
     return [*steps, "Lift the specimen out of the jig and move it by hand: no shim may slip."]
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from shapely import LineString
 
 from pipeline.fabrication.fixtures import coupon, shim_pieces, strip_parts
+from pipeline.fabrication.papers.joint_stiffness import factor_words
 from pipeline.fabrication.parts import (
     STRAIGHT,
     THIN_WALL,
@@ -105,8 +106,8 @@ def bill_rows(
     yield from shims
     kinds = {number: shim.id for shim in specimen.shims for number in shim.ligaments}
     for ligament in specimen.ligaments:
-        note = f"{ligament.name}; shim {kinds[ligament.number]}; {prebend_words(ligament)}"
-        yield BillRow("ligament", str(ligament.number), 1, length=ligament.length, note=note)
+        factors = specimen.stiffness.get(ligament.number)
+        yield _ligament(ligament, kinds[ligament.number], factors)
     for file, parts in contents.items():
         note, count = _counted(len(parts), "part"), 1
         if file.startswith("laser/") and settings.laser.kerf:
@@ -180,6 +181,14 @@ def _shim(shim: Shim, settings: Fabrication, holders: Mapping[str, Sequence[str]
         files=" ".join(holders.get(shim.id, ())),
         note=f"{_counted(len(shim.ligaments), 'ligament')}, {_counted(shim.spares, 'spare')}",
     )
+
+
+def _ligament(ligament: Ligament, shim: str, factors: Sequence[float] | None) -> BillRow:
+    """Describes a ligament; notes how its shim is bent, and how much stiffer it is to be."""
+    note = f"{ligament.name}; shim {shim}; {prebend_words(ligament)}"
+    if factors is not None:
+        note += f"; {factor_words(factors)} in the study"
+    return BillRow("ligament", str(ligament.number), 1, length=ligament.length, note=note)
 
 
 def prebend_words(ligament: Ligament) -> str:

@@ -19,6 +19,7 @@ _READ = (
     "shims",
     "prebend",
     "free_dofs",
+    "stiffness_factors",
     "as_built",
     "thin_walls_mm",
     "files",
@@ -81,6 +82,12 @@ def write_manifest(
         "prebend_note": PREBEND_NOTE,
         "free_dofs": {label: list(dofs) for label, dofs in specimen.free_dofs.items()},
         "free_dofs_note": "of clamped and driven units in the study; the fixtures hold them all",
+        "stiffness_factors": {
+            str(number): [float(f"{factor:.5g}") for factor in factors]
+            for number, factors in specimen.stiffness.items()
+        },
+        "stiffness_factors_note": "axial, shear and bending stiffness of ligaments in the study"
+        " over those of the shims that are drawn, by their numbers, where they are others",
         "as_built": as_built,
         "thin_walls_mm": {label: round(wall, 3) for label, wall in specimen.thin.items()},
         "packages": dict(package_versions()),

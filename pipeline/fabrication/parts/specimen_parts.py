@@ -227,6 +227,9 @@ class BuiltSpecimen:
     driven: tuple[str, ...] = ()  # likewise
     # by label of these units: ux, uy or theta that the study leaves free; fixtures hold them all
     free_dofs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    # axial, shear and bending stiffness of simulated ligaments over those of shims, by number,
+    # where they are others
+    stiffness: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
 
     @property
     def free_words(self) -> str:

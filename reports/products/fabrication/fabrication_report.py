@@ -141,6 +141,9 @@ def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[PackageFact]:
     if free := told["free_dofs"]:
         note = "in the study; the fixtures hold them in every way: guides are yours to make"
         yield PackageFact(f"{len(free)}", "held units that are free along or about an axis", note)
+    if stiff := told["stiffness_factors"]:
+        note = "stiffer or softer: make them so, as the assembly sheet says"
+        yield PackageFact(f"{len(stiff)}", "joints that are simulated otherwise than shims", note)
     volume = float(units["volume_mm3"]) / 1000.0
     yield PackageFact(f"{volume:.0f} cm³", "volume of the units", "as if solid")
     sheets = sum(int(r["count"]) for r in bill if r["item"] == "sheet" and "_nominal" in r["id"])
