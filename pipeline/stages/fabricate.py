@@ -38,6 +38,8 @@ from sim.scene import Scene, as_built
 
 LOG = logging.getLogger(__name__)
 
+_STIFF = 0.95  # of the simulated stiffness, from which a shim is as simulated
+
 WORSE = 1.5
 """Loss as built over that as designed, from which a specimen is another than was simulated."""
 
@@ -88,8 +90,24 @@ def work(args: argparse.Namespace) -> None:
         what = f"the study simulates {len(specimen.stiffness)} joints otherwise than with shims"
         remedy = "make them so (glue or screw stiffer ones), or it is another structure"
         LOG.warning("%s: %s (%s); %s", args.out_dir, what, words, remedy)
+    if posed.material.foil is not None and (softer := foil_warning(specimen)) is not None:
+        LOG.warning("%s: %s", args.out_dir, softer)
     if (worse := loss_warning(simulated or {})) is not None:
         LOG.warning("%s: %s", args.out_dir, worse)
+
+
+def foil_warning(specimen: BuiltSpecimen) -> str | None:
+    """Warns of shims that are freer, and so softer, than ligaments that were simulated as foil."""
+    shares = [ligament.gap / ligament.free for ligament in specimen.ligaments if ligament.gap > 0.0]
+    if not shares or (share := float(np.median(shares))) > _STIFF:
+        return None
+    free = float(np.median([ligament.free for ligament in specimen.ligaments]))
+    return (
+        "material.foil computes the stiffness of foil as long as the ligaments, but tips beside the"
+        f" slots are cut back and shims are free in {free:.2f} mm (median): with {share:.2f} of the"
+        f" axial and bending stiffness and {share**3:.2f} of the shear stiffness; give measured"
+        " constants instead (material.axial_stiffness and so on), or those of the free length"
+    )
 
 
 def loss_warning(built: Mapping[str, float | str]) -> str | None:

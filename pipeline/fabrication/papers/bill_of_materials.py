@@ -185,7 +185,7 @@ def _shim(shim: Shim, settings: Fabrication, holders: Mapping[str, Sequence[str]
 
 def _ligament(ligament: Ligament, shim: str, factors: Sequence[float] | None) -> BillRow:
     """Describes a ligament; notes how its shim is bent, and how much stiffer it is to be."""
-    note = f"{ligament.name}; shim {shim}; {prebend_words(ligament)}"
+    note = f"{ligament.name}; shim {shim}; {prebend_words(ligament)}; free {ligament.free:.2f} mm"
     if factors is not None:
         note += f"; {factor_words(factors)} in the study"
     return BillRow("ligament", str(ligament.number), 1, length=ligament.length, note=note)

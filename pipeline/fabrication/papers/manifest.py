@@ -29,7 +29,8 @@ _READ = (
 PREBEND_NOTE = (
     "each shim before any load, by the number of its ligament: units that it joins; middle of the"
     " ligament; angles of its slots against it, counter-clockwise; largest strain and largest"
-    " moment, of a strip that slides in clamps where the walls of its slots begin"
+    " moment, of a strip that slides in clamps where the walls of its slots begin; its free length"
+    " between these"
 )
 
 
@@ -105,4 +106,5 @@ def _prebend(ligament: Ligament) -> dict[str, str | float | list[float]]:
         "end_angles_deg": [round(math.degrees(angle), 2) for angle in ligament.angles],
         "strain": round(ligament.strain, 5),
         "moment_N_mm": round(ligament.moment, 3),
+        "free_mm": round(ligament.free, 3),
     }

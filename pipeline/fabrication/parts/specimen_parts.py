@@ -191,6 +191,7 @@ class Ligament:
     angles: tuple[float, float] = (0.0, 0.0)  # of both slots against it, counter-clockwise, rad
     strain: float = 0.0  # largest one of the shim before any load
     moment: float = 0.0  # largest one in the shim before any load, N mm
+    gap: float = 0.0  # between the vertices that it joins, as designed
 
     @property
     def name(self) -> str:

@@ -5,6 +5,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
 import shapely
 
 from pipeline.fabrication.engraving import orientation_mark, place_id
@@ -128,9 +129,9 @@ def _ligaments(
         pair, bent = (net.labels[a], net.labels[b]), prebend(one, other, settings)
         length = round(one.grip + bent.free + other.grip, 4)
         x, y = ((one.mouth + other.mouth) / 2.0).tolist()
-        ligaments.append(
-            Ligament(number, pair, length, bent.free, (x, y), bent.angles, bent.strain, bent.moment)
-        )
+        gap = float(np.linalg.norm(other.mouth - one.mouth))
+        held = (bent.angles, bent.strain, bent.moment, gap)
+        ligaments.append(Ligament(number, pair, length, bent.free, (x, y), *held))
     return tuple(ligaments)
 
 

@@ -135,12 +135,15 @@ def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[PackageFact]:
             f" {100 * YIELD:g} %, where polyester begins to yield"
         )
         yield PackageFact(f"{100 * strains[-1]:.1f} %", "strain of a shim before any load", note)
+    if free := sorted(one["free_mm"] for one in told["prebend"].values()):
+        note = f"at the median, {free[-1]:.2f} mm at most: between the walls that hold a shim"
+        yield PackageFact(f"{free[len(free) // 2]:.2f} mm", "free length of shims", note)
     if letters := told["letters_for_ids"]:
         note = ", ".join(f"{letter} is {label}" for label, letter in letters.items())
         yield PackageFact(f"{len(letters)}", "units with a letter for their id", note)
-    if free := told["free_dofs"]:
+    if loose := told["free_dofs"]:
         note = "in the study; the fixtures hold them in every way: guides are yours to make"
-        yield PackageFact(f"{len(free)}", "held units that are free along or about an axis", note)
+        yield PackageFact(f"{len(loose)}", "held units that are free along or about an axis", note)
     if stiff := told["stiffness_factors"]:
         note = "stiffer or softer: make them so, as the assembly sheet says"
         yield PackageFact(f"{len(stiff)}", "joints that are simulated otherwise than shims", note)

@@ -83,7 +83,13 @@ def test_the_page_shows_every_sheet_and_plate_and_tells_the_bill(package: Path, 
     for text in found:
         with Image.open(io.BytesIO(base64.b64decode(text))) as image:
             assert (np.asarray(image.convert("L")) < 230).sum() > 100
-    for words in ("<strong>6</strong>units", "A1 to C2", "shims with spares", "laser.kerf"):
+    for words in (
+        "<strong>6</strong>units",
+        "A1 to C2",
+        "shims with spares",
+        "laser.kerf",
+        "free length of shims",
+    ):
         assert words in page
 
 
