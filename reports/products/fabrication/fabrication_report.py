@@ -154,9 +154,9 @@ def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[PackageFact]:
     yield PackageFact(
         f"{sheets} / {plates}", "sheets to cut / plates to print", "fixtures included"
     )
-    route = next((r["note"] for r in bill if r["id"].startswith("laser/units_")), "")
-    how, _, why = route.partition("; ")[2].partition(": ")
-    yield PackageFact(how.partition(" from ")[0], "units by laser", f"{how}: {why}" if why else how)
+    route = told["laser_route"]
+    how = route.partition(": ")[0].partition(" from ")[0]
+    yield PackageFact(how, "units by laser", route)
     prints = total["prints"]
     took, _, needs = prints["note"].partition(", ")
     note = f"{needs} of filament, fixtures included; by a slicer's standard settings"

@@ -139,3 +139,25 @@ def test_losses_that_are_energies_have_their_unit() -> None:
     asked = problem.load(FIG4)
     rows = list(fabrication_report.as_built(asked, told))
     assert ("Cloaked structure: loss J", "0.0347 N mm", "0.111 N mm") in rows
+
+
+@pytest.mark.parametrize(
+    ("laser", "value", "note"),
+    [
+        ({"kerf": "0.15 mm"}, "cut 6 times", "pin and glue: slots of 0.45 mm are cut 3 times"),
+        ({"kerf": "0 mm"}, "cut 6 times", "pin and glue: slots of 0.45 mm are cut 3 times"),
+        ({"aspect_ratio": 1.0}, "print only", "which would take 18 layers"),
+        ({"aspect_ratio": 20.0}, "cut", "cut from sheet of 8.1 mm"),
+    ],
+)
+def test_the_page_tells_whether_units_can_be_cut(
+    tmp_path: Path, laser: dict[str, object], value: str, note: str
+) -> None:
+    asked = built.write(tmp_path / "cloaked", {"laser": laser})
+    told = {
+        each.label: each
+        for each in fabrication_report.package(tmp_path / "cloaked", asked)["facts"]
+    }
+    fact = told["units by laser"]
+    assert fact.value == value
+    assert note in fact.note
