@@ -1,11 +1,13 @@
 """Checks the folder laser/ as a whole: every format of every sheet, and all parts exactly once."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+import shapely
+from shapely import Geometry, Point, Polygon
 
 from pipeline.fabrication.checks.assembled_specimen import check_outline
 from pipeline.fabrication.checks.bill_checks import check_shim_pieces
@@ -13,6 +15,7 @@ from pipeline.fabrication.checks.package_record import NOMINAL, PackageRecord
 from pipeline.fabrication.checks.sheet_checks import (
     INNER,
     REFERENCE,
+    SCORE,
     TOLERANCE,
     check_compensation,
     check_curves,
@@ -26,6 +29,9 @@ from pipeline.fabrication.papers import BILL, read_bill
 from pipeline.fabrication.readback import BUG, Curve, Drawing, Fault, read_drawing
 from pipeline.problem.sections import Fabrication
 from sim.core import Floats
+
+_OFF = 0.02  # mm of dots beside the middle of their unit
+_RIM = 0.25  # mm around a dot
 
 
 def check_laser(record: PackageRecord) -> Iterator[Fault]:
@@ -87,10 +93,44 @@ def _check_pins(record: PackageRecord) -> Iterator[Fault]:
 
 
 def _check_dots(record: PackageRecord) -> Iterator[Fault]:
-    """Checks that the templates have a hole for each dot of the bill."""
-    sheets = record.drawings.get(("template", NOMINAL), [])
-    holes = [curve for sheet in sheets for curve in sheet.curves if curve.layer == INNER]
-    yield from _check_count(record, "dot", len(holes), "markers")
+    """Checks that the templates have a hole for each dot of the bill, where the units want it."""
+    found = 0
+    for drawing in record.drawings.get(("template", NOMINAL), []):
+        for part, curves in drawing.parts().items():
+            holes = [curve.polygon for curve in curves if curve.layer == INNER and curve.closed]
+            scored = [curve.line for curve in curves if curve.layer == SCORE]
+            found += len(holes)
+            yield from _check_template(drawing, part, holes, scored)
+    yield from _check_count(record, "dot", found, "markers")
+
+
+def _check_template(
+    drawing: Drawing, part: str, holes: Sequence[Polygon], scored: Sequence[Geometry]
+) -> Iterator[Fault]:
+    """Checks holes against the scored outlines of units around them, where these are whole.
+
+    Several dots of a unit lie about its centroid; one lies there too if there is room for it.
+    """
+    outlines, open_lines, _, _ = shapely.polygonize_full(list(scored))
+    left = list(holes)
+    for outline in shapely.get_parts(outlines):
+        mine = [hole for hole in left if outline.intersects(hole)]
+        left = [hole for hole in left if hole not in mine]
+        middle = shapely.multipoints([hole.centroid for hole in mine]).centroid
+        within = all(outline.contains(hole) for hole in mine)
+        off = middle.distance(outline.centroid) if mine else 0.0
+        cramped = len(mine) == 1 and not outline.contains(_around(outline.centroid, mine[0]))
+        if not within or (off > _OFF and not cramped):
+            what = f"dots {off:.2f} mm off the middle of the unit that is scored around them"
+            yield drawing.fault(what, part, (outline, *mine), "markers")
+    if left and open_lines.is_empty:
+        what = f"{len(left)} dots in no unit that is scored"
+        yield drawing.fault(what, part, tuple(left), "markers")
+
+
+def _around(centre: Point, hole: Polygon) -> Polygon:
+    """Draws a hole about another centre, with the rim that it needs."""
+    return centre.buffer(rectangle_sides(hole)[1] / 2 + _RIM)
 
 
 def _check_count(record: PackageRecord, item: str, found: int, key: str) -> Iterator[Fault]:

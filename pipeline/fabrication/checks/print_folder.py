@@ -32,6 +32,9 @@ _ROUND = 0.05  # by which the area of a polygon may be less than that of its cir
 _ABOVE_ID = 0.75  # share of the base's thickness, of which an id takes half at most
 _SHARED = 0.05  # mm^2 of two holders, of rounding
 _HOLDERS = ("CLAMP", "DRIVE")  # begin the names of what holds units that are clamped, or driven
+_JIG = "JIG"  # begins the names of its plates
+_IN_FLOOR, _IN_WALLS = 1.2, 0.5  # mm above the bed and below the top, where a jig is cut
+_PRESSED, _AROUND = 0.01, 5.0  # mm^2 of a unit within a wall, mm shown beside it
 _LID = "-LID"  # ends the names of what is bolted on top
 
 
@@ -60,6 +63,7 @@ def check_fixtures(record: PackageRecord) -> Iterator[Fault]:
     yield from broken
     if not broken:
         yield from _check_holders(parts, record)
+        yield from _check_jig(parts, record)
     names, faults = _plate_faults(folder.glob("*.3mf"), parts, record.settings)
     yield from faults
     if sorted(names) != sorted(parts):
@@ -88,6 +92,18 @@ def _check_holders(parts: Mapping[str, MeshBody], record: PackageRecord) -> Iter
         if bases[one].intersection(bases[other]).area > _SHARED:
             remedy = "hold units that are farther apart"
             yield parts[other].fault(f"it stands in the way of {one}", "fixture", remedy)
+
+
+def _check_jig(parts: Mapping[str, MeshBody], record: PackageRecord) -> Iterator[Fault]:
+    """Checks that all units of the assembled specimen lie on the jig's plates, in its pockets."""
+    plates = [solid for name, solid in parts.items() if name.startswith(_JIG)]
+    floor = shapely.union_all([solid.section(_IN_FLOOR) for solid in plates]).buffer(_NEAR)
+    walls = shapely.union_all([s.section(float(s.extent[1][2]) - _IN_WALLS) for s in plates])
+    for label, shape in record.shapes.items():
+        if walls.intersection(shape).area > _PRESSED or not floor.covers(shape):
+            what, folder = "it does not fit into its pocket of the jig", record.folder / "fixture"
+            shown = (walls.intersection(shape.buffer(_AROUND)), shape)
+            yield Fault(f"unit {label}", what, "fixture.clearance", BUG, folder, shown, shape)
 
 
 def _base(name: str, parts: Mapping[str, MeshBody], settings: Fabrication) -> Geometry:

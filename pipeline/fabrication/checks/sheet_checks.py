@@ -17,8 +17,8 @@ REFERENCE = "REFERENCE"
 TOLERANCE = 1e-3
 """Lengths of a drawing are right to this, mm."""
 
-INNER, _ENGRAVE = "CUT_INNER", "ENGRAVE"
-_LAYERS = (INNER, OUTER, _ENGRAVE, "SCORE", REFERENCE)
+INNER, SCORE, _ENGRAVE = "CUT_INNER", "SCORE", "ENGRAVE"
+_LAYERS = (INNER, OUTER, _ENGRAVE, SCORE, REFERENCE)
 _CUTS = (INNER, OUTER)
 _CUT_KINDS = ("LWPOLYLINE", "POLYLINE", "CIRCLE", "PATH", "POLYGON", "RECT")
 _LINE_KINDS = (*_CUT_KINDS, "LINE", "SIMPLELINE", "ARC")
@@ -229,8 +229,9 @@ def check_compensation(
         return
     for (part, layer), cuts in ours.items():
         shift = kerf / 2 if layer == OUTER else -kerf / 2
+        way = _way(ours.get((part, OUTER), ()), theirs.get((part, OUTER), ()), kerf)
         for (drawing, curve), (_, drawn) in zip(cuts, theirs[part, layer], strict=True):
-            if not _is_offset(curve.polygon, drawn.polygon, shift):
+            if not _is_offset(curve.polygon, drawn.polygon, shift, way):
                 what = f"not {abs(shift):g} mm {'out' if shift > 0 else 'in'} of the nominal cut"
                 yield drawing.fault(what, part, (curve.line,), "laser.kerf")
 
@@ -245,12 +246,28 @@ def _closed_cuts(drawings: Sequence[Drawing]) -> dict[tuple[str, str], list[tupl
     return cuts
 
 
-def _is_offset(cut: Geometry, nominal: Geometry, shift: float) -> bool:
-    """Tests that a cut is the nominal one moved by `shift`; corners may be round or sharp."""
+def _way(
+    ours: Sequence[tuple[Drawing, Curve]], theirs: Sequence[tuple[Drawing, Curve]], kerf: float
+) -> Floats:
+    """Measures the way (2,) from a part to where it lies at nominal size; NaN of many alike."""
+    if len(ours) != 1 or len(theirs) != 1:
+        return np.full(2, np.nan)
+    (_, curve), (_, drawn) = ours[0], theirs[0]
+    sharp = drawn.polygon.buffer(kerf / 2, join_style="mitre", mitre_limit=MITRE)
+    return _box_centre(sharp) - _box_centre(curve.polygon)
+
+
+def _is_offset(cut: Geometry, nominal: Geometry, shift: float, way: Floats) -> bool:
+    """Tests that a cut is the nominal one, grown by `shift`; corners may be round or sharp.
+
+    Their part lies `way` (2,) from the nominal one; without a number, each cut for itself is laid
+    on the nominal one.
+    """
     sharp = nominal.buffer(shift, join_style="mitre", mitre_limit=MITRE)
     least = nominal.buffer(shift - _KERF_TOLERANCE, quad_segs=8)
     most = nominal.buffer(shift + _KERF_TOLERANCE, join_style="mitre", mitre_limit=2 * MITRE)
-    placed = affinity.translate(cut, *(_box_centre(sharp) - _box_centre(cut)))
+    there = _box_centre(sharp) - _box_centre(cut)
+    placed = affinity.translate(cut, *np.where(np.isnan(way), there, way))
     return bool(placed.covers(least) and most.covers(placed))
 
 

@@ -169,6 +169,16 @@ def test_compensation_for_the_kerf_is_measured(tmp_path: Path, kerf: float, faul
     assert "other parts than at nominal size" in fault.what
 
 
+def test_a_hole_that_is_moved_for_the_kerf_is_found(tmp_path: Path) -> None:
+    nominal = drawn(tmp_path / "nominal.dxf", sheet())
+    curves = [grown(curve, 0.2) for curve in sheet()]
+    for place, curve in enumerate(curves):
+        if curve.layer == "CUT_INNER" and curve.part == "A1":
+            curves[place] = replace(curve, points=np.add(curve.points, [1.5, 0.7]))
+    (fault,) = check_compensation([drawn(tmp_path / "cut.dxf", curves)], [nominal], 0.2)
+    assert fault.what == "not 0.1 mm in of the nominal cut"
+
+
 @pytest.mark.parametrize("name", ["sheet.dxf", "sheet.svg"])
 @pytest.mark.parametrize("content", [b"", b"junk", None])
 def test_what_is_no_drawing_is_refused(tmp_path: Path, name: str, content: bytes | None) -> None:

@@ -154,6 +154,15 @@ def scaled(name: str, factor: float) -> Callable[[Path], None]:
     return damage
 
 
+def with_dots_aside(package: Path) -> None:
+    """A template all of whose holes are off by 1.66 mm, in every file."""
+    for path in package.glob("laser/template_*.dxf"):
+        document = readfile(path)
+        for hole in document.modelspace().query('CIRCLE[layer=="CUT_INNER"]'):
+            hole.translate(1.5, 0.7, 0.0)
+        document.saveas(path)
+
+
 DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "inches": (edited(f"{UNITS}.dxf", "$INSUNITS\n 70\n4", "$INSUNITS\n 70\n1"), "$INSUNITS is 1"),
     "svg corner": (edited(f"{UNITS}.svg", '"A1" d="M', '"A1" d="M1'), "has another size or place"),
@@ -168,6 +177,8 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
         moved("fixture/CLAMP-A1.stl", 18.0),
         "part DRIVE-B1: it stands in the way of CLAMP-A1",
     ),
+    "jig aside": (moved("fixture/JIG1.stl", 1.7), "it does not fit into its pocket of the jig"),
+    "dots aside": (with_dots_aside, "dots 1.66 mm off the middle of the unit"),
     "clamp without a bolt": (
         without_bolt,
         "part CLAMP-A1: it has no hole of 4.2 mm for a bolt",
@@ -214,7 +225,7 @@ def test_the_name_in_a_mesh_ends_with_a_zero(whole: tuple[Path, Problem]) -> Non
         assert path.read_bytes()[79] == 0
 
 
-@pytest.mark.parametrize("name", some(DAMAGES, 11))
+@pytest.mark.parametrize("name", some(DAMAGES, 13))
 def test_a_damaged_package_fails(package: Path, whole: tuple[Path, Problem], name: str) -> None:
     damage, expected = DAMAGES[name]
     damage(package)
