@@ -133,7 +133,8 @@ class AssemblyPlan:
                 self._ligament(ligament, origin)
             for ligament in self._specimen.ligaments:
                 self._shim_number(ligament, origin)
-            self._headings(origin)
+            if self._specimen.in_rows:
+                self._headings(origin)
         self._joints(tile, origin)
 
     def sketch(self, pages: Sequence[Tile], corner: tuple[float, float], scale: float) -> None:

@@ -179,14 +179,16 @@ def assembly_steps(
         )
     pairs = ", ".join(f"{letter} is {label}" for label, letter in specimen.letters.items())
     letters = f" Units too small for their id carry a single letter: {pairs}." if pairs else ""
+    laid = ", row by row from the bottom left" if specimen.in_rows else ""
+    pushed = ", column by column and then row by row" if specimen.in_rows else ""
     steps = [
         "Measure the bar at the foot of each page: 100 mm, or the print is not to scale.",
         joining,
         "Tolerances: vertices within 0.1 mm of the plan, slots "
         f"{settings.slot_width:.2f} mm wide within 0.05 mm, shims no longer than listed and at "
         "most 0.1 mm shorter.",
-        f"Sort {len(specimen.units)} units by their ids, {first} to {last}: a letter for the "
-        "column (from the left), a number for the row (from the bottom). The id is on the "
+        f"Sort {len(specimen.units)} units by their ids, {first} to {last}: {_id_words(specimen)}. "
+        "The id is on the "
         "underside of a printed unit and on top of a cut one; the arrow beside it points to the "
         f"top of the plan, as does a ring at the upper end.{letters}",
         *_kerf_step(settings),
@@ -198,10 +200,9 @@ def assembly_steps(
         f"a foil of {settings.shims.thickness:g} mm. If it is loose or stuck, change "
         "fabrication.slots.clearance and make the package again.",
         "Lay the plan, or the jig, on a flat table and put the units in their places with their "
-        "ids and arrows as on the plan, row by row from the bottom left.",
-        "Push the shims in from above, column by column and then row by row, until they stand "
-        "level with the units. Each must reach the inner end of both slots "
-        f"within {SHIM_PLAY:g} mm.",
+        f"ids and arrows as on the plan{laid}.",
+        f"Push the shims in from above{pushed}, until they stand level with the units. Each "
+        f"must reach the inner end of both slots within {SHIM_PLAY:g} mm.",
         *_bent_step(specimen),
         "Check every gap with the comb, then glue (if at all) from the underside only.",
     ]
@@ -225,6 +226,13 @@ def assembly_steps(
             "another structure than was simulated."
         )
     return [*steps, "Lift the specimen out of the jig and move it by hand: no shim may slip."]
+
+
+def _id_words(specimen: BuiltSpecimen) -> str:
+    """Tells what ids count."""
+    if specimen.in_rows:
+        return "a letter for the column (from the left), a number for the row (from the bottom)"
+    return "the letters count in the order of the lattice's file (A to Z, AA, AB and so on)"
 
 
 def _foil_words(settings: Fabrication) -> str:

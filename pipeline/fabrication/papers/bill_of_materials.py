@@ -100,7 +100,7 @@ def bill_rows(
     for file, parts in contents.items():
         for part in dict.fromkeys(parts):
             holders.setdefault(part, []).append(file)
-    units = [_unit(unit, density, holders) for unit in specimen.units]
+    units = [_unit(unit, density, holders, in_rows=specimen.in_rows) for unit in specimen.units]
     shims = [_shim(shim, settings, holders) for shim in specimen.shims]
     yield from units
     yield from shims
@@ -140,10 +140,13 @@ def bill_rows(
     yield BillRow("total", "prints", len(prints), volume=volume, mass=mass, note=note)
 
 
-def _unit(unit: Unit, density: float, holders: Mapping[str, Sequence[str]]) -> BillRow:
+def _unit(
+    unit: Unit, density: float, holders: Mapping[str, Sequence[str]], *, in_rows: bool
+) -> BillRow:
     """Describes a unit; notes the depths of its slots, by vertex, and the thinnest wall."""
     width, height = unit.part.size
-    note = f"column {unit.column + 1} row {unit.row + 1}"
+    place = f"column {unit.column + 1} row {unit.row + 1}"
+    note = place if in_rows else f"number {unit.column + 1} in the lattice's file"
     if unit.letter:
         note += f"; carries {unit.letter} for its id"
     if unit.slots:
@@ -231,11 +234,12 @@ def _foil(
     pieces = shim_pieces(specimen, settings)
     free = [replace(piece, tabs=()) for piece in pieces]
     sheets = [file for file in contents if file.startswith("laser/shims_") and "nominal" in file]
-    joined = strip_parts(specimen, settings)
     yield _way("free pieces", len(free), free, drawn=tabs is None)
     if tabs is not None:
         yield _way("sheets of pieces on tabs", len(sheets), pieces, drawn=True)
-    yield _way("strips, one a row and a column", len(joined), joined, drawn=False)
+    if specimen.in_rows:
+        joined = strip_parts(specimen, settings)
+        yield _way("strips, one a row and a column", len(joined), joined, drawn=False)
 
 
 def _way(name: str, count: int, parts: Sequence[FlatPart], *, drawn: bool) -> BillRow:

@@ -240,6 +240,20 @@ class BuiltSpecimen:
             labels.setdefault(dofs, []).append(label)
         return "; ".join(f"{' and '.join(d)} of {', '.join(units)}" for d, units in labels.items())
 
+    @cached_property
+    def in_rows(self) -> bool:
+        """Tests that ids tell columns and rows of the lattice, and not the order in a file.
+
+        A file's units have the indices (0, 0), (1, 0), ...: they are a row only if they stand side
+        by side, in this order.
+        """
+        if len({unit.row for unit in self.units}) > 1:
+            return True
+        row = sorted(self.units, key=lambda unit: unit.column)
+        _, low, _, high = shapely.bounds([unit.design for unit in row]).T
+        places = [unit.design.centroid.x for unit in row]
+        return bool(low.max() < high.min()) and places == sorted(places)
+
     @property
     def letters(self) -> dict[str, str]:
         """Letters by label, of the units that carry one instead of their id."""

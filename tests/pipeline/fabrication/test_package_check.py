@@ -159,7 +159,7 @@ def with_dots_aside(package: Path) -> None:
     for path in package.glob("laser/template_*.dxf"):
         document = readfile(path)
         for hole in document.modelspace().query('CIRCLE[layer=="CUT_INNER"]'):
-            hole.translate(1.5, 0.7, 0.0)
+            hole.dxf.center += (1.5, 0.7, 0.0)
         document.saveas(path)
 
 
