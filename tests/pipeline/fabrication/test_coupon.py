@@ -5,7 +5,13 @@ from pathlib import Path
 import pytest
 import shapely
 
-from pipeline.fabrication.fixtures.flat_fixtures import coupon
+from pipeline.fabrication.engraving import text_extent
+from pipeline.fabrication.fixtures.flat_fixtures import (
+    _COUPON_PITCH,
+    _clearance_words,
+    coupon,
+    coupon_solid,
+)
 from pipeline.fabrication.papers import read_bill
 from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.sections import Fabrication
@@ -45,3 +51,22 @@ def test_the_coupon_is_cut_from_as_many_sheets_as_the_units(
     units, tried = (rows[f"laser/{kind}_sheet1_nominal.dxf"] for kind in ("units", "coupon"))
     assert int(units["count"]) == int(tried["count"]) == count
     assert tried["note"].partition("; ")[2] == units["note"].partition("; ")[2]
+
+
+def test_the_first_layer_of_the_coupon_is_drawn_in_as_that_of_units() -> None:
+    printing = {"first_layer_inset": "0.2 mm", "layer": "0.3 mm"}
+    settings = Fabrication.model_validate({"print": printing}, context=SIM_UNITS)
+    part = coupon(settings)
+    first, second, top = coupon_solid(part, settings).layers
+    assert (first.bottom, first.top, second.top) == (0.0, 0.3, top.bottom)
+    assert first.area.equals(part.outline.buffer(-0.2, join_style="mitre"))
+    assert second.area.equals(part.outline)
+    assert len(coupon_solid(part, Fabrication()).layers) == 2
+
+
+def test_each_clearance_of_the_coupon_is_told_apart_and_has_room() -> None:
+    given = {"coupon": ["0.02 mm", "0.025 mm", "0.03 mm", "0.0508 mm"]}
+    settings = Fabrication.model_validate(given, context=SIM_UNITS)
+    words = [_clearance_words(clearance) for clearance in settings.coupon]
+    assert words == ["0.02", "0.025", "0.03", "0.0508"]
+    assert max(text_extent(word, 2.6)[0] for word in words) < _COUPON_PITCH
