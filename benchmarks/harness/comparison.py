@@ -6,7 +6,7 @@ so that another machine, or the same one with other company, is compared fairly.
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ ROUNDING = 1e-10
 _ROUNDS, _SIZE, _LOOPS = 5, 400, 100_000
 
 Record = dict[str, Any]
+Errors = Mapping[str, float | None]
 
 
 def yardstick() -> float:
@@ -42,16 +43,18 @@ def yardstick() -> float:
 
 
 def record(measured: list[Measurement], about: Mapping[str, Any], yard: float) -> Record:
-    """Collects what is kept of a suite: times in yardsticks, errors, machine and commit."""
+    """Collects what is kept of a suite: times in yardsticks, errors, machine and commit.
+
+    An error that is no finite number is kept as None.
+    """
     return {
         **{key: about[key] for key in ("processor", "commit", "date")},
         "candidates": {
             one.name: {
                 "time": one.seconds / yard,
                 "errors": {
-                    name: one.error(name)
-                    for name in quantities(measured)
-                    if np.isfinite(one.error(name))
+                    name: one.error(name) if np.isfinite(one.error(name)) else None
+                    for name in quantities([one])
                 },
             }
             for one in measured
@@ -72,27 +75,40 @@ def keep(name: str, made: Record, path: Path = STORED) -> None:
         aside.write_text(json.dumps(records, indent=1) + "\n", encoding="utf-8")
 
 
-def worse(now: Record, before: Mapping[str, Any]) -> list[str]:
-    """Lists what got slower or less accurate by more than 15 %, a line each."""
+def worse(now: Record, before: Mapping[str, Any], skipped: Sequence[str] = ()) -> list[str]:
+    """Lists what got slower or less accurate by more than 15 % or has no figures, a line each."""
     lines = []
-    for name, found in now["candidates"].items():
-        known = before["candidates"].get(name)
-        if known is None:
+    for name, known in before["candidates"].items():
+        found = now["candidates"].get(name)
+        if name in skipped:
+            continue
+        if found is None:
+            lines.append(f"{name}: no figures any more")
             continue
         if found["time"] > WORSE * known["time"]:
             lines.append(f"{name}: slower, {found['time'] / known['time']:.2f} times the time")
-        for kind, error in found["errors"].items():
-            was = max(known["errors"].get(kind, np.inf), ROUNDING)
-            if error > WORSE * was:
-                lines.append(f"{name}: {kind} less accurate, {error / was:.2f} times the error")
+        lines += [f"{name}: {line}" for line in _less_accurate(found["errors"], known["errors"])]
     return lines
 
 
-def compared(name: str, now: Record, path: Path = STORED) -> str:
-    """Tells the comparison with what is stored."""
+def _less_accurate(found: Errors, known: Errors) -> list[str]:
+    lines = []
+    for kind, was in known.items():
+        if was is None:
+            continue
+        error, least = found.get(kind), max(was, ROUNDING)
+        if error is None:
+            lines.append(f"{kind} has no figure any more")
+        elif error > WORSE * least:
+            lines.append(f"{kind} less accurate, {error / least:.2f} times the error")
+    return lines
+
+
+def compared(name: str, now: Record, path: Path = STORED, skipped: Sequence[str] = ()) -> str:
+    """Tells the comparison with what is stored, but for candidates that were skipped."""
     before = stored(path).get(name)
     if before is None:
         return "  nothing stored to compare with: --keep stores this"
     origin = f"{before['date'][:10]}, {before['processor']}, commit {before['commit'][:10]}"
-    lines = worse(now, before) or ["nothing got slower or less accurate by more than 15 %"]
+    lines = worse(now, before, skipped) or ["nothing got slower or less accurate by more than 15 %"]
     return "\n".join(f"  {line} (against {origin})" for line in lines)

@@ -82,7 +82,8 @@ def _exponent(found: Measured) -> float:
 
 
 def _worst(found: Measured) -> float:
-    return max((outcome.error("energy") for outcome in found.values()), default=np.nan)
+    errors = [outcome.error("energy") for outcome in found.values()]
+    return float(np.max(errors)) if errors else np.nan  # nan where one of them is
 
 
 @cache

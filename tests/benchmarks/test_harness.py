@@ -191,6 +191,30 @@ def test_more_than_15_percent_is_told(seconds: float, error: float, lines: list[
     assert comparison.worse(*rounding) == []
 
 
+def test_figures_that_are_gone_are_told() -> None:
+    fine = Measurement("fine", cpu_s=(1.0,), errors={"loss": 1e-3, "gradient": 1e-3})
+    before = comparison.record([fine, Measurement("long", cpu_s=(9.0,))], ABOUT, 1.0)
+    lost = comparison.record([replace(fine, errors={"loss": np.nan})], ABOUT, 1.0)
+    assert json.loads(json.dumps(lost, allow_nan=False)) == lost
+    assert comparison.worse(lost, before, skipped=("long",)) == [
+        "fine: loss has no figure any more",
+        "fine: gradient has no figure any more",
+    ]
+    assert comparison.worse(before, lost) == []
+    failed = comparison.record([replace(fine, cpu_s=(), failure="no equilibrium")], ABOUT, 1.0)
+    gone = [f"{name}: no figures any more" for name in ("fine", "long")]
+    assert comparison.worse(failed, before) == gone
+
+
+def test_an_energy_that_is_no_number_meets_no_target() -> None:
+    (static,) = suites(["static"])
+    target = next(target for target in static.targets if target.name == "energy error")
+    good = Measurement("15 x 15", cpu_s=(1.0,), errors={"energy@15": 1e-15})
+    for lost in (replace(good, errors={"energy@120": np.nan}), Measurement("x", failure="none")):
+        assert target.verdict({"small": good, "large": lost})[1] == "not measured"
+    assert target.verdict({"small": good}) == (1e-15, "met")
+
+
 def recorded(seconds: float, error: float, yard: float) -> comparison.Record:
     misses = {"loss@a": error, "loss@b": error / 2}
     made = [Measurement("coarse", cpu_s=(seconds,), errors=misses), Measurement("x", failure="no")]
