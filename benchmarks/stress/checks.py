@@ -71,7 +71,7 @@ def balanced(case: StressScene, answer: Answer) -> list[Check]:
     distance, negative = 0.0, 0
     for state in answer.displacement:
         away, below = _newton(case.structure, state, free)
-        distance = max(distance, _size(case, away) / max(1.0, _size(case, state)))
+        distance = float(np.maximum(distance, _size(case, away) / max(1.0, _size(case, state))))
         negative = max(negative, below)
     return [
         Check("distance from balance, mm/mm", distance, FAR_FROM_BALANCE),
@@ -218,7 +218,7 @@ def stages(
         factor = _factor(sp.csc_array(matrix + more))
         step = np.zeros_like(state)
         step[free] = factor.solve(right)
-        worst = max(worst, _size(case, step) / max(solver.tolerance * h, 1e-12))
+        worst = float(np.maximum(worst, _size(case, step) / max(solver.tolerance * h, 1e-12)))
         negative = max(negative, negative_pivots(factor))
     return [
         Check("stages off balance, tolerances", worst, MOST_TOLERANCES),

@@ -94,7 +94,7 @@ def judged(
     """Judges a contest that is over; ``afresh`` is the loss and gradient to judge by."""
     losses = np.array(asked.losses)
     places = [asked.constraints(design) for design in asked.designs]
-    violation = np.array([max(0.0, -float(values.min())) for values, _ in places])
+    violation = np.maximum([-float(values.min()) for values, _ in places], 0.0)
     best, residual = np.full((2, len(losses)), np.nan)
     steepest = float(np.abs(afresh(asked.designs[0])[1]).max())
     bound = np.full(asked.n_variables, REACH)

@@ -137,8 +137,18 @@ def test_saddles_and_stages_off_balance_are_found() -> None:
     record = checks.solved(case, solver).record
     assert isinstance(record, ImplicitRecord)
     assert all(check.kept for check in checks.stages(case, solver, record))
-    record.a[3] *= 1.1
-    assert not all(check.kept for check in checks.stages(case, solver, record))
+    for spoilt in (1.1 * record.a[3], np.nan):
+        record.a[3] = spoilt
+        assert not all(check.kept for check in checks.stages(case, solver, record))
+
+
+def test_a_distance_that_is_no_number_is_not_kept(
+    plate: StressScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer = checks.solved(plate, StaticSolver(plate.topology, np.ones(1)))
+    lost = balance(plate.structure, answer.displacement[0])._replace(force=np.full(27, np.nan))
+    monkeypatch.setattr(checks, "balance", lambda *_: lost)
+    assert not values_of(checks.balanced(plate, answer))["distance from balance, mm/mm"].kept
 
 
 def test_drawn_designs_can_be_made_and_reach_their_bounds() -> None:

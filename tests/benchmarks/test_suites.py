@@ -1,6 +1,8 @@
 """Skips change nothing beyond their tolerance; optimisers, cases and scenes are what they say."""
 
 from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -38,7 +40,7 @@ def refuse_change(
 ) -> None:
     changes = errors(done, skipped)
     assert changes.keys() == done.keys() == skipped.keys()
-    assert max(changes.values()) <= skip.tolerance
+    assert np.max([*changes.values()]) <= skip.tolerance
 
 
 @pytest.mark.parametrize("optimiser", some(suites.OPTIMISERS))
@@ -53,6 +55,18 @@ def test_an_optimiser_lowers_the_loss(optimiser: str) -> None:
     assert course["final"] < 0.9 * course["loss"][0]
     feasible = course["loss"][course["violation"] <= suites.FEASIBLE]
     assert feasible.min() == best[-1]
+
+
+def test_a_design_with_a_clearance_that_is_no_number_is_not_the_best() -> None:
+    asked: Any = SimpleNamespace(
+        losses=[1.0],
+        designs=[np.zeros(2)],
+        clock=[0.0],
+        n_variables=2,
+        constraints=lambda _: (np.array([np.nan, 1.0]), np.eye(2)),
+    )
+    course = suites.optimiser_contest.judged(asked, lambda _: (1.0, np.ones(2), np.zeros(2)))
+    assert np.isnan([*course.violation, *course.best]).all()
 
 
 def test_a_case_does_not_depend_on_those_after_it() -> None:
