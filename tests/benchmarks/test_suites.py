@@ -1,5 +1,6 @@
 """Skips change nothing beyond their tolerance; optimisers, cases and scenes are what they say."""
 
+import re
 from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
@@ -96,6 +97,16 @@ def test_the_baseline_has_the_same_forces() -> None:
     made = parameters_of_design(scene)(jnp.zeros(scene.space.n_variables))
     theirs = jax_baseline.force(scene)(made, jnp.asarray(motion.reshape(-1, 3)))
     np.testing.assert_allclose(np.ravel(theirs), ours, atol=1e-12 * np.abs(ours).max())
+
+
+def test_the_growth_in_words_is_that_of_the_table() -> None:
+    page = " ".join(PAGE.read_text(encoding="utf-8").split())
+    found = re.search(r"exponent of time by units, 30 to 120: ([\d.]+)", page)
+    told = re.search(r"to the power of ([\d.]+) between.*? rises from (\d+) to (\d+);", page)
+    counts = [re.search(rf" {n} x {n} [^x]*?(\d+) factorisations", page) for n in (30, 120)]
+    assert found
+    assert told
+    assert list(told.groups()) == [found[1], *(count[1] for count in counts if count)]
 
 
 def test_the_picture_shows_the_tables_whole() -> None:
