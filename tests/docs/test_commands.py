@@ -19,10 +19,14 @@ import pytest
 
 from pipeline.__main__ import main, run_stage
 from pipeline.runtime import ROOT, STAGES
+from pipeline.workflow.product_checks import check_products
+from pipeline.workflow.studies import PRODUCTS, _reserved, targets
 from tests.docs.pages import PAGES, WALKED, Command, blocks, commands, inline, text
 from tests.e2e.checkout import Checkout
 
 COMMANDS = list(commands())
+MISTAKES = {"rigid_inclusion@quik": "docs/faq.md"}
+"""Targets that there are not, and the pages that show what is told then."""
 
 
 def is_run(command: Command) -> bool:
@@ -53,6 +57,22 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
 def test_make_knows_its_targets(command: Command, checkout: Checkout) -> None:
     words = ["make", "--dry-run", *command.words[1:]]
     subprocess.run(words, cwd=checkout.root, capture_output=True, check=True)
+
+
+def test_targets_are_studies_products_rules_or_commands_of_make() -> None:
+    """What make cannot tell: it takes every preset of a study, and a page may run the workflow."""
+    built = [*targets(), "logo", "logo@quick"]
+    known = {f"{name}{end}" for name in built for end in ("", *PRODUCTS)} | set(_reserved())
+    asked = {
+        target: command.page
+        for command in COMMANDS
+        if command.words[0].endswith(("make", "snakemake")) or is_run(command)
+        for target in command.targets[2 * is_run(command) :]
+        if not (ROOT / target).is_dir()
+    }
+    assert {target: page for target, page in asked.items() if target not in known} == MISTAKES
+    assert {"fig2@edge3", "fig2_front", "fig4@allow", "logo_recordings", "bench"} <= set(asked)
+    check_products(asked)
 
 
 @pytest.mark.slow
