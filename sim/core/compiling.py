@@ -100,7 +100,9 @@ def _turn(loop: str) -> Iterator[None]:
 
 def _take(turn: ExitStack, loop: str) -> None:
     """Waits for the turn; where no file can be made or locked, nobody waits for anybody."""
-    with suppress(OSError):
-        folder = loop_cache.cache_folder() / "turns"
-        folder.mkdir(parents=True, exist_ok=True)
-        fcntl.flock(turn.enter_context((folder / loop).open("w")), fcntl.LOCK_EX)
+    for folder in loop_cache.cache_folders():
+        with suppress(OSError):
+            turns = folder / "turns"
+            turns.mkdir(parents=True, exist_ok=True)
+            fcntl.flock(turn.enter_context((turns / loop).open("w")), fcntl.LOCK_EX)
+            return

@@ -10,7 +10,10 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+import stat
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -32,25 +35,34 @@ _NUMBA_OWN = (
 class SourceHashLocator(_CacheLocator):
     """Locates the cache of one loop of this project; others keep Numba's own places."""
 
-    def __init__(self, function: Callable[..., Any], file: Path) -> None:
+    def __init__(self, function: Callable[..., Any], file: Path, folder: Path) -> None:
         module = ".".join(file.relative_to(ROOT).with_suffix("").parts)
         self._hash = loop_hash(module)
-        self._folder = cache_folder() / f"{module}-{self._hash}"
+        self._folder = folder / f"{module}-{self._hash}"
         self._line = function.__code__.co_firstlineno
         self._py_file = str(file)  # Numba names it in its warning of a loop that cannot be cached
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> SourceHashLocator | None:
-        """Makes the locator of a loop; None where it is none of ours or nothing can be written."""
+        """Makes the locator of a loop; None where it is none of ours.
+
+        Numba's own places would take what changed in another file for current: none is left to it.
+
+        Raises:
+            OSError: no folder can be written.
+        """
         path = Path(file).resolve()
         if not path.is_relative_to(ROOT) or not path.is_file():
             return None
-        located = cls(function, path)
-        try:
-            located.ensure_cache_path()  # type: ignore[no-untyped-call]
-        except OSError:
-            return None
-        return located
+        for folder in cache_folders():
+            located = cls(function, path, folder)
+            with suppress(OSError):
+                located.ensure_cache_path()  # type: ignore[no-untyped-call]
+                return located
+        raise OSError(
+            f"compiled loops can be kept neither in {cache_folder()} nor in a folder of your own"
+            f" below {tempfile.gettempdir()}; name another one by NUMBA_CACHE_DIR"
+        )
 
     def get_cache_path(self) -> str:
         """Names the folder of the loop's machine code."""
@@ -79,6 +91,27 @@ def cache_folder() -> Path:
     """Returns the folder of all compiled loops: NUMBA_CACHE_DIR, or one of the user's caches."""
     named = os.environ.get("NUMBA_CACHE_DIR")
     return Path(named) if named else platformdirs.user_cache_path("metacloak") / "loops"
+
+
+def cache_folders() -> Iterator[Path]:
+    """Lists that folder and, where it cannot be written, one of the user's for temporary files."""
+    yield cache_folder()
+    with suppress(OSError):
+        yield _temporary_folder()
+
+
+def _temporary_folder() -> Path:
+    """Makes a folder that only this user can write: what lies there is run.
+
+    Raises:
+        OSError: it cannot be made, or others may have written there.
+    """
+    folder = Path(tempfile.gettempdir(), f"metacloak-{os.getuid()}")
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
+        raise PermissionError(f"others can write {folder}")
+    return folder / "loops"
 
 
 def install() -> None:

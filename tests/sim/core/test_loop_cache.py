@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -31,12 +32,17 @@ def checkout(root: Path) -> Path:
     return root
 
 
-def run(root: Path, cache: Path) -> list[str]:
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)}
+def asked(root: Path, cache: Path, **places: str) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)} | places
     command = [sys.executable, "-c", RUN]
-    return subprocess.run(
-        command, cwd=root, env=environment, text=True, capture_output=True, check=True
-    ).stdout.split()
+    how: dict[str, Any] = {"text": True, "capture_output": True}
+    return subprocess.run(command, cwd=root, env=environment, check=False, **how)
+
+
+def run(root: Path, cache: Path, **places: str) -> list[str]:
+    told = asked(root, cache, **places)
+    assert told.returncode == 0, told.stderr
+    return told.stdout.split()
 
 
 def test_a_second_checkout_compiles_nothing_and_an_edited_one_does(tmp_path: Path) -> None:
@@ -48,6 +54,36 @@ def test_a_second_checkout_compiles_nothing_and_an_edited_one_does(tmp_path: Pat
     assert run(second, cache) == ["7", "0"]
     (second / "sim/inner.py").write_text(LOOPS["sim/inner.py"].replace("2 * n", "5 * n"))
     assert run(second, cache) == ["16", "1"]
+
+
+def test_a_folder_that_cannot_be_written_is_replaced_by_one_for_temporary_files(
+    tmp_path: Path,
+) -> None:
+    root, spare = checkout(tmp_path / "checkout"), tmp_path / "spare"
+    spare.mkdir()
+    unwritable = root / "sim/inner.py" / "none"
+    assert run(root, unwritable, TMPDIR=str(spare)) == ["7", "1"]
+    assert run(root, unwritable, TMPDIR=str(spare)) == ["7", "0"]
+    (root / "sim/inner.py").write_text(LOOPS["sim/inner.py"].replace("2 * n", "5 * n"))
+    assert run(root, unwritable, TMPDIR=str(spare)) == ["16", "1"]
+    assert not list(root.rglob("*.nbi"))
+
+
+@pytest.mark.parametrize("way", ["others may write it", "link"])
+def test_code_that_others_may_have_written_is_not_run(tmp_path: Path, way: str) -> None:
+    root, spare = checkout(tmp_path / "checkout"), tmp_path / "spare"
+    own = spare / f"metacloak-{os.getuid()}"
+    (tmp_path / "elsewhere").mkdir(mode=0o700)
+    spare.mkdir()
+    if way == "link":
+        own.symlink_to(tmp_path / "elsewhere")
+    else:
+        own.mkdir()
+        own.chmod(0o777)
+    told = asked(root, root / "sim/inner.py" / "none", TMPDIR=str(spare))
+    assert told.returncode == 1
+    assert "name another one by NUMBA_CACHE_DIR" in told.stderr
+    assert not list(own.rglob("*.nb?"))
 
 
 @pytest.fixture(scope="module")
