@@ -29,6 +29,35 @@ def import_closure(modules: Iterable[str], root: Path, *, packages: bool = True)
     return found
 
 
+def file_closure(file: Path, root: Path) -> dict[str, Path]:
+    """Maps the names of a file below the root and of all that it imports to their files.
+
+    Packages that hold a module are left out. A file outside of this project's packages, such as a
+    script or a test, may import others beside it or below the root.
+    """
+    module = _module_of(file, root)
+    if locate(module, root) is not None:
+        return import_closure([module], root, packages=False)
+    found: dict[str, Path] = {}
+    waiting = [file]
+    while waiting:
+        path = waiting.pop()
+        module = _module_of(path, root)
+        if module in found:
+            continue
+        found[module] = path
+        names = _imported(path, module, root)
+        found |= import_closure(names, root, packages=False)
+        others = [f"{name.replace('.', '/')}.py" for name in names if not locate(name, root)]
+        places = (folder / name for folder in {path.parent, root} for name in others)
+        waiting += filter(Path.is_file, places)
+    return found
+
+
+def _module_of(file: Path, root: Path) -> str:
+    return ".".join(file.relative_to(root).with_suffix("").parts)
+
+
 @cache
 def locate(module: str, root: Path) -> Path | None:
     """Finds the file of a module of this project; None for what lies outside or is no module."""

@@ -22,7 +22,7 @@ import numba.core.config
 import platformdirs
 from numba.core.caching import _CacheLocator
 
-from sim.core.import_graph import import_closure
+from sim.core.import_graph import file_closure
 from sim.core.instruction_set import LEVEL, can_pin
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -37,7 +37,7 @@ class SourceHashLocator(_CacheLocator):
 
     def __init__(self, function: Callable[..., Any], file: Path, folder: Path) -> None:
         module = ".".join(file.relative_to(ROOT).with_suffix("").parts)
-        self._hash = loop_hash(module)
+        self._hash = loop_hash(file)
         self._folder = folder / f"{module}-{self._hash}"
         self._line = function.__code__.co_firstlineno
         self._py_file = str(file)  # Numba names it in its warning of a loop that cannot be cached
@@ -52,7 +52,7 @@ class SourceHashLocator(_CacheLocator):
             OSError: no folder can be written.
         """
         path = Path(file).resolve()
-        if not path.is_relative_to(ROOT) or not path.is_file():
+        if not _is_ours(path):
             return None
         for folder in cache_folders():
             located = cls(function, path, folder)
@@ -77,11 +77,18 @@ class SourceHashLocator(_CacheLocator):
         return str(self._line)
 
 
+def _is_ours(file: Path) -> bool:
+    """Tells files of the checkout from what is installed, in an environment within it too."""
+    if not file.is_relative_to(ROOT) or not file.is_file():
+        return False
+    return "site-packages" not in file.relative_to(ROOT).parts
+
+
 @cache
-def loop_hash(module: str, root: Path = ROOT) -> str:
+def loop_hash(file: Path, root: Path = ROOT) -> str:
     """Hashes the file of a loop and what it imports: constants and callees are compiled into it."""
     digest = hashlib.sha256()
-    for name, path in sorted(import_closure([module], root, packages=False).items()):
+    for name, path in sorted(file_closure(file, root).items()):
         content = path.read_bytes()
         digest.update(f"{name} {len(content)}\n".encode() + content)
     return digest.hexdigest()[:16]

@@ -20,7 +20,7 @@ LOOPS = {
     "sim/inner.py": "from sim.core import compiled\n\n@compiled\ndef inner(n):\n    return 2 * n\n",
     "sim/other.py": "",
 }
-RUN = "from sim.loops import outer as f; f(3); print(f(3), sum(f.stats.cache_misses.values()))"
+RUN = "from {} import outer as f; f(3); print(f(3), sum(f.stats.cache_misses.values()))"
 
 
 def checkout(root: Path) -> Path:
@@ -32,15 +32,17 @@ def checkout(root: Path) -> Path:
     return root
 
 
-def asked(root: Path, cache: Path, **places: str) -> subprocess.CompletedProcess[str]:
+def asked(
+    root: Path, cache: Path, loops: str = "sim.loops", **places: str
+) -> subprocess.CompletedProcess[str]:
     environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)} | places
-    command = [sys.executable, "-c", RUN]
+    command = [sys.executable, "-c", RUN.format(loops)]
     how: dict[str, Any] = {"text": True, "capture_output": True}
     return subprocess.run(command, cwd=root, env=environment, check=False, **how)
 
 
-def run(root: Path, cache: Path, **places: str) -> list[str]:
-    told = asked(root, cache, **places)
+def run(root: Path, cache: Path, loops: str = "sim.loops", **places: str) -> list[str]:
+    told = asked(root, cache, loops, **places)
     assert told.returncode == 0, told.stderr
     return told.stdout.split()
 
@@ -86,6 +88,37 @@ def test_code_that_others_may_have_written_is_not_run(tmp_path: Path, way: str) 
     assert not list(own.rglob("*.nb?"))
 
 
+def test_a_script_of_the_checkout_is_compiled_anew_after_any_edit(tmp_path: Path) -> None:
+    root, cache = checkout(tmp_path / "checkout"), tmp_path / "cache"
+    texts = {
+        "experiments/loops.py": "from sim.core import compiled\nfrom sim.inner import inner\n"
+        "from experiments.step import STEP\n\n"
+        "@compiled\ndef outer(n):\n    return inner(n) + STEP + 2 * n\n",
+        "experiments/step.py": "STEP = 2 * 1\n",
+    }
+    (root / "experiments").mkdir()
+    for name, text in texts.items():
+        (root / name).write_text(text)
+    assert run(root, cache, "experiments.loops") == ["14", "1"]
+    assert run(root, cache, "experiments.loops") == ["14", "0"]
+    values = {"experiments/loops.py": 17, "experiments/step.py": 18, "sim/inner.py": 21}
+    for edited, value in values.items():
+        path = root / edited
+        path.write_text(path.read_text().replace("2 * ", "3 * "))
+        assert run(root, cache, "experiments.loops") == [str(value), "1"]
+
+
+def test_what_is_installed_within_the_checkout_keeps_the_places_of_numba(tmp_path: Path) -> None:
+    root, cache = checkout(tmp_path / "checkout"), tmp_path / "cache"
+    installed = root / ".venv/site-packages/other.py"
+    installed.parent.mkdir(parents=True)
+    installed.write_text(LOOPS["sim/inner.py"].replace("inner", "outer"))
+    path = f"{root}{os.pathsep}{installed.parent}"
+    assert run(root, cache, "other", PYTHONPATH=path) == ["6", "1"]
+    installed.write_text(LOOPS["sim/inner.py"].replace("inner", "outer").replace("2 * n", "5 * n"))
+    assert run(root, cache, "other", PYTHONPATH=path) == ["15", "1"]
+
+
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("copy")
@@ -97,13 +130,14 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("module", sorted(import_closure([MARCH], ROOT, packages=False)))
 def test_a_byte_in_any_file_that_a_loop_reaches_changes_its_hash(copy: Path, module: str) -> None:
-    before = loop_hash(MARCH, copy)
+    march = copy / f"{MARCH.replace('.', '/')}.py"
+    before = loop_hash(march, copy)
     path = copy / f"{module.replace('.', '/')}.py"
     text = path.read_bytes()
     path.write_bytes(text + b"\n")
     loop_hash.cache_clear()
     try:
-        assert loop_hash(MARCH, copy) != before
+        assert loop_hash(march, copy) != before
     finally:
         path.write_bytes(text)
         loop_hash.cache_clear()
