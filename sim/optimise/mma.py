@@ -146,7 +146,9 @@ class _Run:
         """Starts with a tenth of each function's mean slope across the poles."""
         slopes = abs(sp.csr_array(sp.vstack([self.point.gradient[None], self.point.jacobian])))
         entries = np.maximum(np.diff(slopes.indptr), 1)
-        self.stiffness = np.maximum(0.1 * (slopes @ self.distance) / entries, 1e-6)
+        least = np.full(len(entries), 1e-6)
+        least[0] *= self.problem.unit
+        self.stiffness = np.maximum(0.1 * (slopes @ self.distance) / entries, least)
         self.least = 1e-2 * self.stiffness
 
     def outer(self) -> None:

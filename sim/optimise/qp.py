@@ -1,6 +1,6 @@
 """The two quadratic programs of a feasible SQP step, by piqp (Schwan et al. 2023)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import piqp
@@ -24,21 +24,24 @@ def dense_step(
     least: Floats,
     lower: Floats,
     upper: Floats,
+    unit: float = 1.0,
 ) -> Quadratic | None:
     """Minimises gradient.d + d.hessian.d / 2 subject to matrix d >= least and lower <= d <= upper.
 
-    Returns None if there is no such d or the solver does not converge.
+    The solver's tolerances are absolute, for what is minimised in multiples of `unit`. Returns None
+    if there is no such d or the solver does not converge.
     """
     solver = _tuned(piqp.DenseSolver())
     solver.setup(
-        np.asfortranarray(hessian),
-        gradient,
+        np.asfortranarray(hessian / unit),
+        gradient / unit,
         G=np.asfortranarray(matrix.toarray()) if len(least) else None,
         h_l=least if len(least) else None,
         x_l=lower,
         x_u=upper,
     )
-    return _solution(solver, len(least))
+    found = _solution(solver, len(least))
+    return found and replace(found, multipliers=unit * found.multipliers)
 
 
 def shortest_step(

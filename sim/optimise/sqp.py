@@ -181,6 +181,7 @@ class Descent:
             -spendable[rows],
             np.maximum(self.problem.lower - point.x, -radius),
             np.minimum(self.problem.upper - point.x, radius),
+            self.problem.unit,
         )
         if found is None:
             return None

@@ -94,6 +94,19 @@ def test_losses_decrease_and_steps_respect_radius_and_bounds() -> None:
     assert np.abs(designs).max() <= 1.0
 
 
+@pytest.mark.parametrize("method", OPTIONS)
+def test_tiny_losses_are_minimised_like_others(method: Method) -> None:
+    known = problems.many(20, 50)
+
+    def tiny(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        loss, slope, _ = known.loss(x)
+        return 1e-13 * loss, 1e-13 * slope, np.zeros(0)
+
+    found = solved(replace(known, loss=tiny), method)
+    np.testing.assert_allclose(found.x, known.optimum, atol=2e-2)
+    assert 1e13 * found.loss == pytest.approx(known.loss(known.optimum)[0], rel=1e-3)
+
+
 def test_infeasible_start_is_moved_first() -> None:
     known = problems.corner()
     found = minimise("sqp", known.loss, known.constraints, np.array([2.5, -1.0]), options=EXACT)
