@@ -13,6 +13,7 @@ from pipeline.problem.fields import (
     Gap,
     Length,
     Positive,
+    PositiveShare,
     Samples,
     Section,
     exactly_one,
@@ -103,7 +104,7 @@ class ConstraintLimits(Section):
     void_angle: Angle | None = None
     gap: Gap | None = None
     convex: bool = True
-    shim_strain: Positive | None = None
+    shim_strain: PositiveShare | None = None
     straight_shims: bool = False
 
 

@@ -21,9 +21,11 @@ from .quantities import Length as Length
 from .quantities import Modulus as Modulus
 from .quantities import Moment as Moment
 from .quantities import Positive as Positive
+from .quantities import PositiveShare as PositiveShare
 from .quantities import Ratio as Ratio
 from .quantities import RotaryDamping as RotaryDamping
 from .quantities import Samples as Samples
+from .quantities import Share as Share
 from .quantities import Stiffness as Stiffness
 from .quantities import fault as fault
 from .section import Section as Section

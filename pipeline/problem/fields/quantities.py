@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from pipeline.problem.fields import units
@@ -56,6 +56,12 @@ def _schema(dimension: units.Dimension) -> WithJsonSchema:
     )
 
 
+def _check_share(number: float) -> float:
+    if number > 1.0:
+        raise fault(f"a share of {number:.0%} is too large", "give a share: 5 % is 0.05")
+    return number
+
+
 Length = Annotated[float, _reader(units.LENGTH, 0.0, True), _schema(units.LENGTH)]
 Gap = Annotated[float, _reader(units.LENGTH, 0.0, False), _schema(units.LENGTH)]
 Coordinate = Annotated[float, _reader(units.LENGTH, None, False), _schema(units.LENGTH)]
@@ -81,6 +87,9 @@ RotaryDamping = Annotated[
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Ratio = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+_AT_MOST_ONE = (AfterValidator(_check_share), Field(json_schema_extra={"maximum": 1.0}))
+Share = Annotated[Ratio, *_AT_MOST_ONE]
+PositiveShare = Annotated[Positive, *_AT_MOST_ONE]
 MOST = 1_000_000
 """Of anything counted: beyond it there is a slip of the hand, or a machine without memory."""
 Count = Annotated[int, Field(ge=1, le=MOST, strict=True)]

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.problem.fields import Angle, Count, Frequency, Length, Positive, Ratio, Section, fault
+from pipeline.problem.fields import Angle, Count, Frequency, Length, Positive, Section, Share, fault
 from pipeline.problem.sections.drives import Drive, Support, read_several
 from pipeline.problem.sections.regions import Region
 
@@ -43,8 +43,8 @@ class Robust(Section):
     loads: tuple[Load, ...] = ()
     sharpness: Annotated[float, Field(ge=1.0, le=64.0)] = 1.0
     copies: Annotated[int, Field(ge=0, le=64, strict=True)] = 0
-    geometry: Ratio = 0.03
-    stiffness: Ratio | None = None
+    geometry: Share = 0.03
+    stiffness: Share | None = None
     copy_sharpness: Annotated[float, Field(ge=1.0, le=64.0)] = 1.0
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from pipeline.problem.fields import Angle, Gap, Ratio, Samples, Section
+from pipeline.problem.fields import Angle, Gap, Samples, Section, Share
 
 
 class Assembly(Section):
@@ -33,11 +33,11 @@ class Tolerances(Section):
         assembly: how far units are off their place.
     """
 
-    geometry: Ratio = 0.01
-    ligaments: Ratio = 0.05
-    stiffness: Ratio = 0.05
-    units: Ratio = 0.1
-    damping: Ratio = 0.2
+    geometry: Share = 0.01
+    ligaments: Share = 0.05
+    stiffness: Share = 0.05
+    units: Share = 0.1
+    damping: Share = 0.2
     assembly: Assembly = Assembly()
 
 
@@ -63,11 +63,11 @@ class Prediction(Section):
     samples: Samples = 64
     level: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
-    geometry: Ratio | None = None
-    ligaments: Ratio | None = None
-    stiffness: Ratio | None = None
-    units: Ratio | None = None
-    damping: Ratio | None = None
+    geometry: Share | None = None
+    ligaments: Share | None = None
+    stiffness: Share | None = None
+    units: Share | None = None
+    damping: Share | None = None
     assembly: Assembly | None = None
 
     @property

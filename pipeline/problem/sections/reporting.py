@@ -12,9 +12,10 @@ from pipeline.problem.fields import (
     Gap,
     Modulus,
     Positive,
-    Ratio,
+    PositiveShare,
     Samples,
     Section,
+    Share,
     fault,
 )
 
@@ -31,7 +32,7 @@ class WorkshopTolerance(Section):
     """
 
     geometry: Gap = 0.1
-    stiffness: Ratio = 0.1
+    stiffness: Share = 0.1
 
 
 class Robustness(Section):
@@ -47,8 +48,8 @@ class Robustness(Section):
     """
 
     samples: Count = 200
-    geometry: tuple[Ratio, ...] = (0.03, 0.05)
-    stiffness: tuple[Ratio, ...] = (0.1,)
+    geometry: tuple[Share, ...] = (0.03, 0.05)
+    stiffness: tuple[Share, ...] = (0.1,)
     together: WorkshopTolerance | None = WorkshopTolerance()
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
@@ -109,7 +110,7 @@ class ReportOptions(Section):
     snapshots: tuple[Gap, ...] = ()
     instants: tuple[Delay, ...] = ()
     places: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(max_length=3)] = ()
-    shim_strain_limit: Positive = 0.05
+    shim_strain_limit: PositiveShare = 0.05
     unit_modulus: Modulus = 2000.0
     as_built: bool = False
     measured_constants: MeasuredConstants | None = None
