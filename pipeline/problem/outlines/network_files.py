@@ -145,12 +145,16 @@ def _of_netcdf(path: Path) -> NetworkContent:
 
 
 def _of_dxf(path: Path) -> NetworkContent:
-    """Reads closed polylines as units, lines as ligaments, whatever their layers; to mm.
+    """Reads closed polylines as units, lines and open ones of two points as ligaments; to mm.
+
+    Whatever their layers.
 
     Raises:
-        UserError: unreadable, or an outline with arcs.
+        UserError: unreadable, an outline with arcs, a longer line that is open, or a block.
     """
     from ezdxf import recover
+    from ezdxf.entities.insert import Insert
+    from ezdxf.entities.line import Line
     from ezdxf.entities.lwpolyline import LWPolyline
     from ezdxf.entities.polyline import Polyline
     from ezdxf.enums import InsertUnits
@@ -167,36 +171,49 @@ def _of_dxf(path: Path) -> NetworkContent:
     unitless = unit == InsertUnits.Unitless
     scale = 1.0 if unitless else conversion_factor(unit, InsertUnits.Millimeters)
     space = drawing.modelspace()
-    outlines = (
-        _outline(line, scale)
-        for line in space.query("LWPOLYLINE POLYLINE")
-        if isinstance(line, LWPolyline | Polyline)
-    )
-    ligaments = tuple(
-        (_scaled(line.dxf.start, scale), _scaled(line.dxf.end, scale))
-        for line in space.query("LINE")
-    )
-    return NetworkContent(tuple(filter(None, outlines)), ligaments)
+    polygons: list[tuple[Point, ...]] = []
+    ligaments: list[tuple[Point, Point]] = []
+    for drawn in space.query("LINE LWPOLYLINE POLYLINE INSERT"):
+        if isinstance(drawn, Line):
+            ligaments.append((_scaled(drawn.dxf.start, scale), _scaled(drawn.dxf.end, scale)))
+        elif isinstance(drawn, Insert):
+            x, y = _scaled(drawn.dxf.insert, scale)
+            what = f"the block {drawn.dxf.name} at ({x:g}, {y:g}) mm is not read"
+            raise UserError(what, remedy="explode it to the polylines and lines that it shows")
+        elif isinstance(drawn, LWPolyline | Polyline):
+            _sort_in(drawn, scale, polygons, ligaments)
+    return NetworkContent(tuple(polygons), tuple(ligaments))
 
 
-def _outline(line: LWPolyline | Polyline, scale: float) -> tuple[Point, ...]:
-    """Lists corners of a polyline, mm, that is closed or ends where it began; none of another.
+def _sort_in(
+    line: LWPolyline | Polyline,
+    scale: float,
+    polygons: list[tuple[Point, ...]],
+    ligaments: list[tuple[Point, Point]],
+) -> None:
+    """Adds a polyline to the polygons if it is closed or ends where it began, or to the ligaments.
 
     Raises:
-        UserError: it has arcs.
+        UserError: it has arcs, or is open and longer than a ligament.
     """
     from ezdxf.entities.lwpolyline import LWPolyline
 
     places = line.vertices() if isinstance(line, LWPolyline) else line.points()
     corners = tuple(_point((scale * place[0], scale * place[1])) for place in places)
+    if not corners:
+        return
+    x, y = corners[0]
     returns = len(corners) > 1 and corners[0] == corners[-1]
-    if not (line.is_closed or returns):
-        return ()
     if line.has_arc:
-        x, y = corners[0]
         remedy = "draw its rounded sides by straight pieces"
         raise UserError(f"the outline from ({x:g}, {y:g}) mm on has arcs", remedy=remedy)
-    return corners[:-1] if returns else corners
+    if line.is_closed or returns:
+        polygons.append(corners[:-1] if returns else corners)
+    elif len(corners) == 2:
+        ligaments.append((corners[0], corners[1]))
+    else:
+        what = f"the open line from ({x:g}, {y:g}) mm on is neither a unit nor a ligament"
+        raise UserError(what, remedy="close it, or draw each ligament by its two ends alone")
 
 
 def _scaled(place: Vec3, scale: float) -> Point:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from ezdxf.enums import InsertUnits
-from ezdxf.filemanagement import new
+from ezdxf.filemanagement import new, readfile
 from pydantic import TypeAdapter
 
 from pipeline import datasets
@@ -112,6 +112,35 @@ def test_outlines_with_arcs_are_told(tmp_path: Path) -> None:
     drawing.modelspace().add_line((0.0, 0.0), (1.0, 1.0))
     drawing.saveas(tmp_path / "x.dxf")
     with refused("the outline from (0, 0) mm on has arcs", "lattice.file", remedy="straight"):
+        load(from_file(tmp_path, "x.dxf"))
+
+
+def test_ligaments_of_a_drawing_may_be_polylines(tmp_path: Path) -> None:
+    as_dxf(path := tmp_path / "x.dxf", SQUARES)
+    listed = load(from_file(tmp_path, "x.dxf")).lattice
+    drawing = readfile(path)
+    space = drawing.modelspace()
+    for k, line in enumerate(list(space.query("LINE"))):
+        add = space.add_lwpolyline if k % 2 else space.add_polyline2d
+        add([line.dxf.start.vec2, line.dxf.end.vec2])
+        space.delete_entity(line)
+    drawing.saveas(path)
+    assert load(from_file(tmp_path, "x.dxf")).lattice == listed
+
+
+def test_what_a_drawing_would_lose_is_told(tmp_path: Path) -> None:
+    as_dxf(path := tmp_path / "x.dxf", SQUARES)
+    drawing = readfile(path)
+    drawing.blocks.new("PIN").add_circle((0.0, 0.0), 1.0)
+    drawing.modelspace().add_blockref("PIN", (1.0, 2.0))
+    drawing.saveas(path)
+    with refused("the block PIN at (10, 20) mm is not read", "lattice.file", "explode"):
+        load(from_file(tmp_path, "x.dxf"))
+    as_dxf(path, SQUARES)
+    drawing = readfile(path)
+    drawing.modelspace().add_lwpolyline([(1.0, 2.0), (3.0, 4.0), (5.0, 0.0)])
+    drawing.saveas(path)
+    with refused("the open line from (10, 20) mm on is neither", "lattice.file", "close it"):
         load(from_file(tmp_path, "x.dxf"))
 
 
