@@ -108,9 +108,11 @@ def overlay_keys(
 ) -> dict[str, Any]:
     """Lays `overlay` over `base`, both below the keys `above`.
 
-    Mappings merge, all else replaces, null removes a key or turns off what is on by default.
+    Mappings merge, all else replaces, null removes a key or turns off what is on by default. The
+    direction of a drive takes the place of its `directions`, and these of it.
     """
-    merged = dict(base)
+    replaced = _other_directions(overlay) if above[-1:] == ("drive",) else set()
+    merged = {key: value for key, value in base.items() if key not in replaced}
     for key, value in overlay.items():
         below, path = merged.get(key), (*above, key)
         if value is None and path not in SWITCHES:
@@ -120,6 +122,13 @@ def overlay_keys(
         else:
             merged[key] = value
     return merged
+
+
+def _other_directions(overlay: Mapping[str, Any]) -> set[str]:
+    """Lists the keys that those of a drive stand instead of."""
+    others = {"direction": "directions", "directions": "direction"}
+    given = {others[key] for key, word in overlay.items() if key in others and word is not None}
+    return given - overlay.keys()
 
 
 def preset_names(path: str | Path) -> tuple[str, ...]:

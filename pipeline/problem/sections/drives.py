@@ -139,8 +139,11 @@ class _Directed(_Drive):
     @model_validator(mode="before")
     @classmethod
     def _one_direction(cls, data: object) -> object:
-        if not isinstance(data, Mapping) or "direction" not in data or "directions" in data:
+        if not isinstance(data, Mapping) or "direction" not in data:
             return data
+        if "directions" in data:
+            what = "direction and directions exclude each other"
+            raise fault(what, "give one of them", "direction")
         others = {key: value for key, value in data.items() if key != "direction"}
         return {**others, "directions": [data["direction"]]}
 

@@ -1,4 +1,5 @@
 import hashlib
+import json
 import math
 import warnings
 from collections.abc import Iterable, Iterator
@@ -25,7 +26,7 @@ from pipeline.problem import (
 )
 from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.reading import load, overlay_keys, preset_names
-from pipeline.problem.sections import Fabrication, Quads
+from pipeline.problem.sections import Fabrication, LinearRampDrive, Quads
 from pipeline.runtime import ROOT, STAGES
 from tests.pipeline import static
 from tests.pipeline.conftest import Refusal
@@ -123,6 +124,25 @@ def test_overlays_win_idempotently(base: dict[str, object], overlay: dict[str, o
 
 def test_null_removes_a_key() -> None:
     assert overlay_keys({"a": {"b": 1, "c": 2}}, {"a": {"b": None}}) == {"a": {"c": 2}}
+
+
+@pytest.mark.parametrize(
+    ("own", "laid"), [("direction", "directions"), ("directions", "direction")]
+)
+def test_a_direction_takes_the_place_of_directions(own: str, laid: str, tmp_path: Path) -> None:
+    """In a preset that gives one of the two."""
+    path = static.write(tmp_path, static.HOLE, size=5)
+    content = yaml.safe_load(path.read_text())
+    before, after = ({"direction": each, "directions": [each]} for each in ("180 deg", "90 deg"))
+    del content["drive"]["directions"]
+    content["drive"][own] = before[own]
+    content["presets"] = {"up": {"drive": {laid: after[laid]}}, "both": {"drive": before}}
+    path.write_text(json.dumps(content))
+    drive = load(path, "up").drive
+    assert isinstance(drive, LinearRampDrive)
+    assert drive.directions == (math.radians(90.0),)
+    with refused("direction and directions exclude each other", remedy="one of them"):
+        load(path, "both")
 
 
 def test_null_turns_off_what_is_on_by_default(fig2: Path, tmp_path: Path) -> None:
