@@ -7,7 +7,8 @@ from difflib import get_close_matches
 from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validator
-from pydantic.json_schema import JsonSchemaValue
+from pydantic.fields import FieldInfo
+from pydantic.json_schema import JsonSchemaValue, SkipJsonSchema
 from pydantic_core import CoreSchema
 
 from pipeline.problem.fields.quantities import fault
@@ -42,12 +43,13 @@ class Section(BaseModel):
     def _refuse_unknown_keys(cls, data: object) -> object:
         if not isinstance(data, Mapping):
             return data
-        known = [field.alias or name for name, field in cls.model_fields.items()]
+        known = {field.alias or name: field for name, field in cls.model_fields.items()}
         for key in data:
             if key not in known:
-                near = get_close_matches(str(key), known, n=1, cutoff=0.8)
+                offered = [name for name, field in known.items() if not _is_internal(field)]
+                near = get_close_matches(str(key), offered, n=1, cutoff=0.8)
                 hint = f"did you mean {near[0]!r}? " if near else ""
-                raise fault("unknown key", f"{hint}known here: {', '.join(known)}", key=str(key))
+                raise fault("unknown key", f"{hint}known here: {', '.join(offered)}", key=str(key))
         return data
 
 
@@ -61,6 +63,11 @@ def exactly_one(section: Section, *names: str) -> None:
     if len(given) != 1:
         what = "nothing given" if not given else f"{' and '.join(given)} exclude each other"
         raise fault(what, f"give exactly one of: {', '.join(names)}")
+
+
+def _is_internal(field: FieldInfo) -> bool:
+    """Tells a field that no file holds: what was read from another one."""
+    return any(isinstance(each, SkipJsonSchema) for each in field.metadata)
 
 
 def _lead(section: type) -> str:

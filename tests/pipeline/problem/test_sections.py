@@ -7,8 +7,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from pipeline.problem.fields import SIM_UNITS, Section
 from pipeline.problem.model import Problem
+from pipeline.problem.sections.lattices import ListedNetwork
 from pipeline.problem.sections.objective import LoadRanges
-from pipeline.problem.sections.shapes import Smile
+from pipeline.problem.sections.shapes import Image, Smile
 from pipeline.problem.sections.sweep import Sweep
 from pipeline.problem.sections.sweep_cases import group_size
 from tests.tables import cases
@@ -33,6 +34,15 @@ def test_a_default_is_a_value_that_may_be_given() -> None:
                 kind: TypeAdapter[object] = TypeAdapter(field.rebuild_annotation())
                 given = kind.validate_python(field.default, context=SIM_UNITS)
                 assert given == field.default, f"{section.__name__}.{name}"
+
+
+@pytest.mark.parametrize("section", [ListedNetwork, Image])
+def test_keys_that_are_offered_are_those_of_a_file(section: type[Section]) -> None:
+    with pytest.raises(ValidationError) as caught:
+        made(section, fyle="x")
+    remedy = caught.value.errors()[0]["ctx"]["remedy"]
+    keys = section.model_json_schema()["properties"]
+    assert remedy == f"did you mean 'file'? known here: {', '.join(keys)}"
 
 
 @cases("problem", "section, values, told")
