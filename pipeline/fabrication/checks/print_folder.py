@@ -33,7 +33,7 @@ _ABOVE_ID = 0.75  # share of the base's thickness, of which an id takes half at 
 _SHARED = 0.05  # mm^2 of two holders, of rounding
 _HOLDERS = ("CLAMP", "DRIVE")  # begin the names of what holds units that are clamped, or driven
 _JIG = "JIG"  # begins the names of its plates
-_IN_FLOOR, _IN_WALLS = 1.2, 0.5  # mm above the bed and below the top, where a jig is cut
+_IN_FLOOR = 1.2  # mm above the bed, where a jig is neither lettered nor has pockets
 _PRESSED, _AROUND = 0.01, 5.0  # mm^2 of a unit within a wall, mm shown beside it
 _LID = "-LID"  # ends the names of what is bolted on top
 
@@ -98,7 +98,8 @@ def _check_jig(parts: Mapping[str, MeshBody], record: PackageRecord) -> Iterator
     """Checks that all units of the assembled specimen lie on the jig's plates, in its pockets."""
     plates = [solid for name, solid in parts.items() if name.startswith(_JIG)]
     floor = shapely.union_all([solid.section(_IN_FLOOR) for solid in plates]).buffer(_NEAR)
-    walls = shapely.union_all([s.section(float(s.extent[1][2]) - _IN_WALLS) for s in plates])
+    below = min(record.settings.fixture.pocket, record.settings.thickness) / 2
+    walls = shapely.union_all([s.section(float(s.extent[1][2]) - below) for s in plates])
     for label, shape in record.shapes.items():
         if walls.intersection(shape).area > _PRESSED or not floor.covers(shape):
             what, folder = "it does not fit into its pocket of the jig", record.folder / "fixture"

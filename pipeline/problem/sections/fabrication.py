@@ -110,7 +110,8 @@ class Labels(Section):
 
     Attributes:
         height: of the letters; smaller where there is no room.
-        stroke: width of their strokes.
+        stroke: width of their strokes; 0.4 mm at most on arrows and the coupon, 0.5 mm on the
+            fixture, and less on small letters.
         depth: of their strokes; in a thin plate of the fixture half of its thickness.
     """
 
@@ -198,8 +199,10 @@ class Fixture(Section):
         hole: diameter of the bolt holes.
         grid: pitch of the breadboard.
         bolt_pitch: pitch of the bolts of a grip.
-        base: thickness below the units.
-        pocket: depth of the pockets.
+        base: thickness of clamps and grips below the units, and of the back of adapters; the jig
+            has 2.4 mm.
+        pocket: depth of the jig's pockets, and length of the fingers of adapters, at most the
+            height of the units; jaws of clamps and grips are as high as these.
     """
 
     clearance: Gap = 0.15

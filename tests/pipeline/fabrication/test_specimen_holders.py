@@ -237,3 +237,14 @@ def test_columns_of_squares_are_held_as_they_were(name: str, tmp_path: Path) -> 
     assert not others
     assert edge.along == (0.0, 1.0)
     assert {unit.column for unit in edge.units} == {0}
+
+
+@pytest.mark.parametrize(("pocket", "thickness", "depth"), [(2.0, 8.1, 2.0), (4.0, 3.0, 3.0)])
+def test_pockets_of_the_jig_are_as_deep_as_asked_for(
+    pocket: float, thickness: float, depth: float
+) -> None:
+    given = {"fixture": {"pocket": pocket}, "thickness": thickness}
+    asked = Fabrication.model_validate(given, context=SIM_UNITS)
+    made = {part.id: part for part in fixtures(handmade.specimen(), asked, handmade.SPACING)}
+    walls = made["JIG1"].layers[-1]
+    assert walls.top - walls.bottom == pytest.approx(depth)
