@@ -93,6 +93,7 @@ def _prepare(name: str, method: str, tolerance: float, _: Task) -> Run:
 
     system.rates(0.0, rest)
     system.jacobian(0.0, rest)
+    posed.compile_measures()
     return run
 
 

@@ -69,7 +69,10 @@ def at_rest(name: str, tolerances: tuple[float, ...]) -> tuple[Method, ...]:
 
 def _prepare(name: str, method: Callable[..., Floats], tolerance: float, _: Task) -> Run:
     posed = case(name)
-    EquilibriumProblem(posed).tangent(np.zeros(posed.scene.topology.n_dofs))
+    rest, prepared = np.zeros(posed.scene.topology.n_dofs), EquilibriumProblem(posed)
+    prepared.tangent(rest)
+    prepared.residual(rest)
+    posed.compile_measures()
 
     def run() -> Sample:
         balance = EquilibriumProblem(posed)

@@ -93,6 +93,11 @@ class LoadCase:
         """Compiles ``measure``."""
         return jax.jit(self.measure)
 
+    def compile_measures(self) -> None:
+        """Compiles ``measure`` for motions of this case, before anything is timed."""
+        motion = np.zeros((1, len(self.times), self.scene.lattice.n_units, 3))
+        self.measured(motion, self.values)
+
     def results(self, loss: object, motion: object, gradient: object = None) -> dict[str, Floats]:
         """Collects what is compared: region's motion by spacings, loss, gradient and its slope."""
         spacing = self.scene.lattice.spacing

@@ -1,13 +1,14 @@
 """Every method comes to the reference of another family, on lattices of 5 x 5 units."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 from benchmarks.harness import Method, Run, errors
-from benchmarks.methods import own_solvers, scipy_statics, selection
-from benchmarks.scenes import TITLES
+from benchmarks.methods import own_solvers, scipy_dynamics, scipy_statics, selection
+from benchmarks.scenes import TITLES, LoadCase, case
 from benchmarks.scenes.load_cases import scene
 from sim.core import Floats
 from sim.structure import VoidAngleContact
@@ -45,6 +46,31 @@ def test_differences_and_scipy_come_to_the_reference(reference: Found) -> None:
     assert found["gradient"] < 1e-7
     splu = scipy_statics.at_rest("small_push", (1e-4,))[0]
     assert 0 < missed(splu, 1e-4, "loss", reference)["displacement"] < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("name", "listed"),
+    [("small_push", scipy_statics.at_rest), ("small_wave", scipy_dynamics.in_time)],
+)
+def test_scipy_compiles_nothing_while_it_is_timed(
+    name: str,
+    listed: Callable[[str, tuple[float, ...]], tuple[Method, ...]],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    traced: list[str] = []
+    measure = LoadCase.measure
+
+    def counted(self: LoadCase, *given: Any) -> Any:  # noqa: ANN401
+        traced.append(name)
+        return measure(self, *given)
+
+    monkeypatch.setattr(LoadCase, "measure", counted)
+    case.cache_clear()
+    run: Run = listed(name, (1e-3,))[0].prepare(1e-3, "loss")
+    assert traced == [name]
+    run()
+    assert traced == [name]
+    case.cache_clear()
 
 
 @pytest.mark.parametrize("of", [selection.methods, selection.reference_described])
