@@ -1,8 +1,9 @@
 """Bars hold all units of an edge, and do not stand in one another's way."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from itertools import combinations, pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,10 +11,11 @@ import shapely
 from shapely import LineString, Polygon, affinity
 
 from pipeline import datasets, problem
+from pipeline.fabrication.engraving import place_id
 from pipeline.fabrication.fixtures import fixtures
 from pipeline.fabrication.fixtures.holder_bases import held_edges, plan_bases
 from pipeline.fabrication.parts import BuiltSpecimen
-from pipeline.fabrication.units import build_specimen, network
+from pipeline.fabrication.units import build_specimen, network, specimen_units
 from pipeline.problem import Problem
 from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.sections import Fabrication
@@ -22,29 +24,42 @@ from sim.core import Floats
 from tests.pipeline import unchanged
 from tests.pipeline.fabrication import handmade
 
-
-def built(folder: Path, name: str, *changes: tuple[str, str]) -> tuple[Problem, BuiltSpecimen]:
-    """The draft of a study, undesigned."""
-    path = folder / "problem.yaml"
-    text = (ROOT / f"experiments/{name}/problem.yaml").read_text(encoding="utf-8")
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    path.write_text(text, encoding="utf-8")
-    asked = problem.load(path, "quick")
-    design = unchanged.write(path, "quick")
-    net = network(datasets.read(design, "design"), "altered")
-    return asked, build_specimen(net, asked.fabrication, (name, "altered"), design)
+Change = tuple[str, str]
+Draft = Callable[..., tuple[Problem, BuiltSpecimen]]
 
 
 @pytest.fixture(scope="module")
-def lattice(tmp_path_factory: pytest.TempPathFactory) -> tuple[Problem, BuiltSpecimen]:
+def built(tmp_path_factory: pytest.TempPathFactory) -> Draft:
+    """Makes the draft of a study, undesigned, once, its ids placed anywhere: no holder asks."""
+
+    @cache
+    def made(name: str, *changes: Change) -> tuple[Problem, BuiltSpecimen]:
+        path = tmp_path_factory.mktemp(name) / "problem.yaml"
+        text = (ROOT / f"experiments/{name}/problem.yaml").read_text(encoding="utf-8")
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        path.write_text(text, encoding="utf-8")
+        asked = problem.load(path, "quick")
+        design = unchanged.write(path, "quick")
+        net = network(datasets.read(design, "design"), "altered")
+        rim = net.polygons[0]
+        somewhere = place_id("A1", rim, rim, asked.fabrication.labels)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(specimen_units, "place_id", lambda *_: somewhere)
+            return asked, build_specimen(net, asked.fabrication, (name, "altered"), design)
+
+    return made
+
+
+@pytest.fixture
+def lattice(built: Draft) -> tuple[Problem, BuiltSpecimen]:
     """7 x 7 squares."""
-    return built(tmp_path_factory.mktemp("fig2"), "fig2")
+    return built("fig2")
 
 
-def test_both_triangles_of_a_cell_are_held_by_one_bar(tmp_path: Path) -> None:
-    asked, specimen = built(tmp_path, "kagome")
+def test_both_triangles_of_a_cell_are_held_by_one_bar(built: Draft) -> None:
+    asked, specimen = built("kagome")
     bases = {
         part.id: part.layers[1].area
         for part in fixtures(specimen, asked.fabrication, asked.lattice.spacing)
@@ -61,14 +76,21 @@ def test_both_triangles_of_a_cell_are_held_by_one_bar(tmp_path: Path) -> None:
 
 
 SLANTED = (("cell_angle: 90 deg", "cell_angle: 60 deg"), ("[45 mm, 45 mm]", "[66 mm, 38 mm]"))
-ACROSS = (("units: left", "units: bottom"), ("units: right", "units: top"))
 
 
-@pytest.mark.parametrize(("changes", "angle"), [(SLANTED, 60.0), (SLANTED + ACROSS, 0.0)])
+@pytest.mark.parametrize(("sides", "angle"), [("left and right", 60.0), ("below and above", 0.0)])
 def test_bars_run_along_the_sides_of_a_slanted_lattice(
-    tmp_path: Path, changes: tuple[tuple[str, str], ...], angle: float
+    built: Draft, sides: str, angle: float
 ) -> None:
-    asked, specimen = built(tmp_path, "kagome", *changes)
+    asked, specimen = built("kagome", *SLANTED)
+    if sides == "below and above":
+        rows = {unit.label: unit.row for unit in specimen.units}
+        low, high = (
+            tuple(label for label, row in rows.items() if row == end)
+            for end in (min(rows.values()), max(rows.values()))
+        )
+        assert len(low) == len(high) == 12
+        specimen = replace(specimen, clamped=low, driven=high)
     bases, capped = plan_bases(specimen, asked.fabrication, asked.lattice.spacing)
     assert not capped
     held = [{unit.label for unit in base.held} for base in bases]
@@ -84,15 +106,21 @@ def test_bars_run_along_the_sides_of_a_slanted_lattice(
             assert base.area.intersection(unit.outline).area > 0.3 * unit.outline.area
 
 
-def test_a_base_has_its_bolt_and_no_narrow_neck(tmp_path: Path) -> None:
+def test_a_base_has_its_bolt_and_no_narrow_neck(built: Draft) -> None:
     """Even a pad that winds between units that move."""
-    asked, specimen = built(tmp_path, "kagome", *SLANTED)
-    every = [unit.label for unit in specimen.units]
-    for label in every[:20:2]:
-        alone = replace(specimen, clamped=(label,), driven=())
-        for base in plan_bases(alone, asked.fabrication, asked.lattice.spacing)[0]:
-            assert len(base.area.interiors) == 1
-            assert isinstance(Polygon(base.area.exterior).buffer(-0.9), Polygon)
+    asked, specimen = built("kagome", *SLANTED)
+    alone = [replace(specimen, clamped=(unit.label,), driven=()) for unit in specimen.units]
+    bases = [
+        base.area
+        for each in alone[:20:2]
+        for base in plan_bases(each, asked.fabrication, asked.lattice.spacing)[0]
+    ]
+    assert len(bases) == 9
+    for area in bases:
+        assert len(area.interiors) == 1
+        inner = Polygon(area.exterior).buffer(-0.9)
+        assert isinstance(inner, Polygon)
+        assert not inner.is_empty
 
 
 def test_units_of_a_list_are_grouped_by_where_they_are() -> None:
@@ -230,8 +258,8 @@ def test_jaws_stand_lower_than_the_units_and_higher_than_the_base(thickness: flo
 
 
 @pytest.mark.parametrize("name", ["fig4"])
-def test_columns_of_squares_are_held_as_they_were(name: str, tmp_path: Path) -> None:
-    _, specimen = built(tmp_path, name)
+def test_columns_of_squares_are_held_as_they_were(name: str, built: Draft) -> None:
+    _, specimen = built(name)
     held = [specimen.by_label[label] for label in specimen.clamped]
     (edge,), others = held_edges(held, specimen, 15.0)
     assert not others
