@@ -154,21 +154,15 @@ class _Run:
     def outer(self) -> None:
         """One accepted move, with as many corrections as it takes."""
         model = Approximation(self.point, self.distance, self.stiffness)
-        while self.problem.finished is None:
-            try:
-                trial = self._propose(model)
-            except UnsolvedError as error:
-                self.reason = str(error)
-                return
-            except SimulationError:  # of the constraints: they know of no design so far away
-                self.distance *= SLOWER**2
-                if self.distance.max() < self.options.step_min:
-                    self.reason = "no further progress"
-                    return
+        refused, stuck = np.zeros(0), False
+        while self.problem.finished is None and self.reason is None:
+            trial = self._next(model)
+            if trial is None:
                 continue
-            if trial is None or self._length(trial.place) < self.options.step_min:
-                self.reason = "no further progress"
-                return
+            stuck = stuck or np.array_equal(trial.place.x, refused)
+            if stuck and trial.promised >= self.point.loss:
+                self._come_closer()
+                continue
             outcome = self.problem.simulate(trial.place)
             if isinstance(outcome, EvaluatedPoint) and self._keeps(trial, outcome):
                 self._move(trial, outcome)
@@ -176,11 +170,33 @@ class _Run:
             self.problem.record(
                 trial.place, outcome, False, float(self.distance.max()), self.residual
             )
+            refused = trial.place.x
             if isinstance(outcome, EvaluatedPoint):
                 shortfall = np.array([outcome.loss - trial.promised])
                 model.correct(np.zeros(1, dtype=int), outcome.x, shortfall)
             else:
                 self.distance *= SLOWER**2
+
+    def _next(self, model: Approximation) -> MmaTrial | None:
+        """Proposes a design; None if the poles have come closer in place of it, or at the end."""
+        try:
+            trial = self._propose(model)
+        except UnsolvedError as error:
+            self.reason = str(error)
+            return None
+        except SimulationError:  # of the constraints: they know of no design so far away
+            self._come_closer()
+            return None
+        if trial is None or self._length(trial.place) < self.options.step_min:
+            self.reason = "no further progress"
+            return None
+        return trial
+
+    def _come_closer(self) -> None:
+        """Brings the poles closer; the end if that leaves no room for a step."""
+        self.distance *= SLOWER**2
+        if self.distance.max() < self.options.step_min:
+            self.reason = "no further progress"
 
     def _length(self, place: ConstraintPoint) -> float:
         return float(np.abs(place.x - self.point.x).max())

@@ -25,6 +25,32 @@ def test_steps_that_raise_the_loss_are_not_taken() -> None:
     assert (np.diff([e.loss for e in found.evaluations if e.accepted]) < 0).all()
 
 
+@pytest.mark.parametrize(("seed", "reason"), [(36, "stationary"), (28, "no further progress")])
+def test_no_design_is_simulated_again_where_none_better_is_promised(seed: int, reason: str) -> None:
+    random = np.random.default_rng(seed)
+    n, m = int(random.integers(2, 9)), int(random.integers(1, 14))
+    matrix, bottom = random.normal(size=(n, n)), random.normal(size=n) * 2
+    scale = 10.0 ** random.integers(-9, 10)
+    normals, level = random.normal(size=(m, n)), random.uniform(0.05, 1, m)
+    bend = random.uniform(0, 1)
+
+    def loss(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        off = matrix @ x - bottom
+        value, slope = (
+            off @ off + 0.3 * np.sin(3 * x).sum(),
+            2 * matrix.T @ off + 0.9 * np.cos(3 * x),
+        )
+        return float(scale * value), scale * slope, np.zeros(0)
+
+    def constraints(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return level - normals @ x - bend * (x @ x), -normals - 2 * bend * x
+
+    found = minimise("mma", loss, constraints, np.zeros(n), options=MmaOptions(evaluations=40))
+    designs = np.array([e.x for e in found.evaluations])
+    assert (np.diff(designs, axis=0) != 0.0).any(axis=1).all()
+    assert found.reason == reason
+
+
 def test_failed_evaluations_bring_the_asymptotes_closer() -> None:
     known = cantilever()
     failures: list[np.ndarray] = []
