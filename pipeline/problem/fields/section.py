@@ -67,7 +67,7 @@ def exactly_one(section: Section, *names: str) -> None:
 
 def _is_internal(field: FieldInfo) -> bool:
     """Tells a field that no file holds: what was read from another one."""
-    return any(isinstance(each, SkipJsonSchema) for each in field.metadata)
+    return any(isinstance(each, SkipJsonSchema) for each in field.metadata)  # type: ignore[misc]
 
 
 def _lead(section: type) -> str:

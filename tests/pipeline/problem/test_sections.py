@@ -39,7 +39,7 @@ def test_a_default_is_a_value_that_may_be_given() -> None:
 @pytest.mark.parametrize("section", [ListedNetwork, Image])
 def test_keys_that_are_offered_are_those_of_a_file(section: type[Section]) -> None:
     with pytest.raises(ValidationError) as caught:
-        made(section, fyle="x")
+        made(section, files="x")
     remedy = caught.value.errors()[0]["ctx"]["remedy"]
     keys = section.model_json_schema()["properties"]
     assert remedy == f"did you mean 'file'? known here: {', '.join(keys)}"
