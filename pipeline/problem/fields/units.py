@@ -102,6 +102,8 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
     if match is None:
         raise UserError("not a number with a unit", remedy=wanted)
     if match["rest"] is not None:
+        if re.match(r",\d", match["rest"]):
+            raise UserError("a decimal comma", remedy=f"write a decimal point; {wanted}")
         raise UserError(f"unknown unit {match['rest']!r}", remedy=wanted)
     if match["unit"] is None:
         raise UserError("the unit is missing", remedy=wanted)

@@ -54,6 +54,9 @@ class Slots(Section):
 
     @model_validator(mode="after")
     def _depths_ascend(self) -> Self:
+        if self.depth_min > self.depth_max:
+            what = f"the least depth is above the largest, {self.depth_max:g} mm"
+            raise fault(what, f"give at most {self.depth_max:g} mm", "depth_min")
         if not self.depth_min <= self.depth <= self.depth_max:
             what = f"{self.depth:g} mm is not within the limits of the depth"
             remedy = f"keep it from {self.depth_min:g} mm to {self.depth_max:g} mm"
@@ -272,8 +275,12 @@ class Fabrication(Section):
         if self.shims.thickness + 2.0 * max(self.coupon) > _WIDEST_SLOT:
             what = f"the coupon has no room for slots wider than {_WIDEST_SLOT:g} mm"
             raise fault(what, "give smaller clearances", "coupon")
-        most = min(self.slots.depth_min, _WIDEST_TAB) - self.laser.kerf
+        widest = min(self.slots.depth_min, _WIDEST_TAB)
+        most = widest - self.laser.kerf
         if self.shims.tabs is not None and self.shims.tabs.width > most:
+            if most <= 0.0:
+                what = f"a cut of {self.laser.kerf:g} mm leaves no tabs that stand within the slots"
+                raise fault(what, f"give less than {widest:g} mm", "laser.kerf")
             what = f"tabs of {self.shims.tabs.width:g} mm do not stand within the slots"
             raise fault(what, f"give at most {most:g} mm", "shims.tabs.width")
         return self
