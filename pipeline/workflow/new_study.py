@@ -11,7 +11,7 @@ from textwrap import indent
 
 from pipeline import problem
 from pipeline.problem.outlines import read_outlines
-from pipeline.runtime import BUILD, UserError, found_in, write_folder_atomically
+from pipeline.runtime import BUILD, WORK, UserError, found_in, write_folder_atomically
 from pipeline.workflow.studies import check_new
 
 LOG = logging.getLogger(__name__)
@@ -49,7 +49,10 @@ def work(args: argparse.Namespace) -> None:
         except UserError as error:  # the template is sound: it is the image
             error.file, error.line = str(args.image), None
             raise
-    LOG.info("made %s; a draft: %s %s@quick", folder / "problem.yaml", BUILD, args.name)
+    own, draft = WORK / "experiments", f"{BUILD} {args.name}@quick"
+    if args.folder.resolve() != own.resolve():
+        draft = f"move its folder to {own}, then {draft}"
+    LOG.info("made %s; a draft: %s", folder / "problem.yaml", draft)
 
 
 def text(args: argparse.Namespace) -> str:
@@ -82,6 +85,11 @@ def _check(args: argparse.Namespace, folder: Path) -> None:
         raise UserError("there is a study of this name", file=folder, remedy=remedy)
     check_new(args.name, args.folder.resolve().parent)
     if args.image is None:
+        if args.threshold is not None or args.invert:
+            key = "--invert" if args.threshold is None else "--threshold"
+            raise UserError(
+                "it is for an image", key=key, remedy="give --image too, or leave it out"
+            )
         return
     if args.kind == "dynamic":
         remedy = "leave --image out, or take --kind static"

@@ -7,6 +7,8 @@ from PIL import Image, ImageDraw
 from pipeline.__main__ import run_stage
 from pipeline.problem import void_units
 from pipeline.problem.reading import load
+from pipeline.runtime import ROOT
+from pipeline.workflow import new_study
 from pipeline.workflow.studies import families
 from tests.pipeline.conftest import Failing
 
@@ -22,6 +24,19 @@ def test_a_template_is_a_problem(tmp_path: Path, kind: str) -> None:
     assert path.read_text().count("# ") > 8
     made = load(path).fabrication
     assert made.shims.thickness + 2 * min(made.coupon) > made.laser.kerf
+
+
+def test_a_draft_is_made_where_studies_are(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with caplog.at_level("INFO"):
+        assert run_stage("new", ["mine", "--folder", str(tmp_path / "other")]) == 0
+        assert "then make mine@quick" in caplog.text
+        assert f"move its folder to {ROOT / 'experiments'}" in caplog.text
+        caplog.clear()
+        monkeypatch.setattr(new_study, "WORK", tmp_path)
+        assert run_stage("new", ["mine", "--folder", str(tmp_path / "experiments")]) == 0
+        assert "a draft: make mine@quick" in caplog.text
 
 
 @pytest.mark.parametrize("name", ["cat.png", "my cat's {best} $1, ü #2.png"])
@@ -59,6 +74,8 @@ def test_a_coloured_logo_becomes_a_void(tmp_path: Path, capsys: pytest.CaptureFi
         (["movies"], "remedy: choose another name"),
         (["test"], "the target test is that of a command of make"),
         (["docs"], "the target docs is that of a command of make"),
+        (["x", "--threshold", "0.5"], "key:    --threshold"),
+        (["x", "--invert"], "give --image too"),
         (["x", "--image", "none.png"], "the image cannot be read"),
         (["x", "--image", str(CAT), "--threshold", "7"], f"file:   {CAT}"),
         (["x", "--image", str(CAT), "--kind", "dynamic"], "the dynamic template has no void"),
