@@ -258,11 +258,12 @@ def _shim_stiffnesses(problem: Problem, lattice: Lattice) -> Sequence[float | Nu
 def stiffness_factors(problem: Problem, structure: str) -> Floats:
     """Divides the stiffness of ligaments by that of shims: axial, shear, bending (n_ligaments, 3).
 
-    The structure is "intact", "altered" or "cloaked"; only in the last two an inclusion is stiff.
+    All ligaments of the intact structure are listed, in the order of a design's; in the structures
+    "altered" and "cloaked" an inclusion is stiff.
     """
-    intact = structure == "intact"
-    lattice = lattice_of(problem) if intact else altered_lattice_of(problem)
-    material = material_of(problem, lattice) if intact else _stiffened(problem, lattice)
+    lattice = lattice_of(problem)
+    of_structure = material_of if structure == "intact" else _stiffened
+    material = of_structure(problem, lattice)
     factors = [
         getattr(material, name) / np.broadcast_to(shim, lattice.ligament_units.shape[:1])
         for name, shim in zip(STIFFNESSES, _shim_stiffnesses(problem, lattice), strict=True)

@@ -64,9 +64,9 @@ def work(args: argparse.Namespace) -> None:
         free = {net.labels[n]: dofs for n, dofs in free_dofs(scene).items() if n in net.labels}
         factors = stiffness_factors(posed, args.structure)
         other = {
-            ligament.number: tuple(each)
-            for ligament, each in zip(built.ligaments, factors.tolist(), strict=True)
-            if not np.allclose(each, 1.0)
+            ligament.number: tuple(factors[ligament.number].tolist())
+            for ligament in built.ligaments
+            if not np.allclose(factors[ligament.number], 1.0)
         }
         specimen = replace(built, free_dofs=free, stiffness=other)
         package = PackageFolder(room, specimen, posed, str(args.problem), bar.update)

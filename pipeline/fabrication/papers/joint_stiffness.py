@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from pipeline.fabrication.parts import BuiltSpecimen
 
-_NAMED = 24  # joints of one stiffness; the bill names all
+_NAMED, _SORTS = 24, 4  # joints of one stiffness, and stiffnesses; the bill names all
 
 
 def factor_words(factors: Sequence[float]) -> str:
@@ -22,6 +22,8 @@ def stiffness_words(specimen: BuiltSpecimen) -> str:
         if ligament.number in specimen.stiffness:
             words = factor_words(specimen.stiffness[ligament.number])
             joints.setdefault(words, []).append(ligament.name)
+    if len(joints) > _SORTS:
+        return f"{len(specimen.stiffness)} joints of {len(joints)} stiffnesses, in the bill"
     return "; ".join(f"{words}: {_named(names)}" for words, names in joints.items())
 
 

@@ -64,3 +64,10 @@ def test_joints_are_named_by_their_stiffness() -> None:
         f"2 times as stiff: {names[0]}, {names[2]};"
         f" 1 times as stiff along, 0.5 across, 3 in bending: {names[1]}"
     )
+
+
+def test_many_stiffnesses_are_left_to_the_bill() -> None:
+    one = handmade.specimen()
+    factors = {each.number: (2.0 + each.number,) * 3 for each in one.ligaments}
+    words = stiffness_words(dataclasses.replace(one, stiffness=factors))
+    assert words == "7 joints of 7 stiffnesses, in the bill"
