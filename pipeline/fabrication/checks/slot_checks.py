@@ -16,6 +16,7 @@ from shapely import Geometry, LineString, Point, Polygon
 from pipeline.fabrication.readback import BUG, Fault
 from pipeline.problem.sections import Fabrication
 from sim.core import Floats
+from sim.structure import angle_between
 
 _TOLERANCE = 5e-3  # mm, of lengths on a closed outline
 _CLOSING = 1.0  # radius of the disc in slot widths
@@ -194,14 +195,22 @@ def _check_area(shape: UnitSection, filled: Geometry, settings: Fabrication) -> 
 
 def _corners(shape: UnitSection, settings: Fabrication) -> Geometry:
     """Covers the corners that may lose material: truncated tips beside slots, fillets."""
-    slots = settings.slots
+    slots, corners = settings.slots, np.asarray(shape.design.exterior.coords)[:-1]
     truncated = slots.depth_max - slots.depth_min + settings.slot_width
-    reaches = [
-        truncated if vertex in shape.ligaments else 4 * settings.fillet_radius + 4 * _TOLERANCE
-        for vertex in range(len(shape.design.exterior.coords) - 1)
-    ]
-    points = shapely.points(np.asarray(shape.design.exterior.coords)[:-1])
-    return shapely.union_all(shapely.buffer(points, reaches))
+    reaches = settings.fillet_radius * _fillet_reach(corners) + 4 * _TOLERANCE
+    slotted = np.isin(np.arange(len(corners)), shape.ligaments)
+    reaches = np.where(slotted, np.maximum(truncated, reaches), reaches)
+    return shapely.union_all(shapely.buffer(shapely.points(corners), reaches))
+
+
+def _fillet_reach(corners: Floats) -> Floats:
+    """Measures how far (n,) from the corners (n, 2) fillets of radius one begin; 0 of hollow ones.
+
+    Between edges at an angle a that is 1 / tan(a / 2) along both.
+    """
+    ahead, behind = (np.roll(corners, -step, axis=0) - corners for step in (1, -1))
+    angle = np.asarray(angle_between(ahead, behind)) % (2.0 * np.pi)
+    return np.maximum(0.0, 1.0 / np.tan(angle / 2.0))
 
 
 def _check_slot(shape: UnitSection, slot: MeasuredSlot, settings: Fabrication) -> Iterator[Fault]:

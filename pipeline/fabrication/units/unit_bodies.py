@@ -113,6 +113,8 @@ def unit_body(
     """
     design = net.polygons[number]
     plain = filleted(design, settings.fillet_radius)
+    if plain.is_empty:
+        raise _too_round(net.labels[number], design, settings, file)
     failure = NoRoomError(None, 0.0)
     for share in _STAGES if settings.slots.thicken > 0.0 else _STAGES[:1]:
         growth = share * settings.slots.thicken
@@ -134,13 +136,36 @@ def unit_body(
         )
         if all(_is_held(slot, settings) for slot in slots):
             return UnitBody(body, slots)
-    raise _no_slot(net.labels[number], design, failure, settings, file)
+    fault = _no_slot(net.labels[number], design, failure, settings, file)
+    if settings.fillet_radius > 0.0:
+        sharp = settings.model_copy(update={"fillet_radius": 0.0})
+        try:
+            unit_body(net, number, slotted, neighbours, sharp, file)
+        except UnbuildableUnitError:
+            raise fault from None
+        fault = _too_round(net.labels[number], design, settings, file)
+    raise fault
 
 
 def _is_held(slot: Slot, settings: Fabrication) -> bool:
     """Tests that a shim is held long enough, between thick enough walls."""
     grip, least = slot.depth - slot.truncation, settings.slots.depth_min
     return grip >= least - _HAIR and slot.wall >= settings.minimum_wall - _ROUNDING
+
+
+def _too_round(
+    label: str, design: Polygon, settings: Fabrication, file: Path
+) -> UnbuildableUnitError:
+    value = f"{settings.fillet_radius:g} mm"
+    return UnbuildableUnitError(
+        f"corners rounded by {value} leave no room for the slots of unit {label}",
+        (design,),
+        design.exterior,
+        file=file,
+        key="fabrication.fillet_radius",
+        value=value,
+        remedy="lower it, or leave it out",
+    )
 
 
 def _no_slot(

@@ -19,11 +19,11 @@ _ROUND = 12  # segments per quarter circle
 
 
 def filleted(polygon: Polygon, radius: float) -> Polygon:
-    """Rounds the convex corners of a polygon."""
+    """Rounds the convex corners of a polygon; nothing is left of one that is narrower than they."""
     if radius == 0.0:
         return polygon
     inner = polygon.buffer(-radius, join_style="mitre", mitre_limit=100.0)
-    return _largest(inner.buffer(radius, quad_segs=_ROUND))
+    return inner if inner.is_empty else _largest(inner.buffer(radius, quad_segs=_ROUND))
 
 
 def room_to_grow(
