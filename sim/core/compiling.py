@@ -65,7 +65,8 @@ def compiled(function: F, **how: Any) -> F:  # noqa: ANN401  (options of Numba)
 
 
 def _in_turn(function: Callable[..., Any], how: dict[str, Any]) -> Any:  # noqa: ANN401
-    loop: Any = jit(cache=True, **how)(function)
+    loop: Any = jit(**how)(function)
+    loop._cache = loop_cache.LoopCache(function)  # type: ignore[no-untyped-call]
     compile_one, name = loop.compile, f"{function.__module__}.{function.__qualname__}"
 
     def compile_in_turn(signature: object) -> object:

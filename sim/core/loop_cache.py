@@ -9,7 +9,9 @@ signature, and the processor's features.
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
+import pickle
 import stat
 import tempfile
 from collections.abc import Callable, Iterator
@@ -20,10 +22,12 @@ from typing import Any
 
 import numba.core.config
 import platformdirs
-from numba.core.caching import _CacheLocator
+from numba.core.caching import FunctionCache, _CacheLocator
 
 from sim.core.import_graph import file_closure
 from sim.core.instruction_set import LEVEL, can_pin
+
+LOG = logging.getLogger(__name__)
 
 ROOT = Path(__file__).resolve().parents[2]
 _NUMBA_OWN = (
@@ -75,6 +79,32 @@ class SourceHashLocator(_CacheLocator):
     def get_disambiguator(self) -> str:
         """Tells loops of the same name in one file apart, by their line."""
         return str(self._line)
+
+
+class LoopCache(FunctionCache):
+    """Keeps the machine code of a loop; does without what cannot be read or written."""
+
+    def load_overload(self, sig: object, target_context: object) -> Any:  # noqa: ANN401
+        """Reads what was compiled for a signature; None where that is to be done."""
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except (EOFError, pickle.UnpicklingError):
+            LOG.warning("damaged files in %s: compiling that loop again", self.cache_path)
+        for path in Path(self.cache_path).glob(f"{self._impl.filename_base}.*"):
+            path.unlink(missing_ok=True)
+        return None
+
+    def save_overload(self, sig: object, data: object) -> None:
+        """Writes what was compiled for a signature, where there is room."""
+        try:
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+        except OSError as error:
+            _tell_unkept(str(Path(self.cache_path).parent), error.strerror)
+
+
+@cache
+def _tell_unkept(folder: str, reason: str) -> None:
+    LOG.warning("no compiled loops can be kept in %s, each run compiles again: %s", folder, reason)
 
 
 def _is_ours(file: Path) -> bool:

@@ -119,6 +119,38 @@ def test_what_is_installed_within_the_checkout_keeps_the_places_of_numba(tmp_pat
     assert run(root, cache, "other", PYTHONPATH=path) == ["15", "1"]
 
 
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+def test_a_damaged_file_is_compiled_again(tmp_path: Path, kind: str) -> None:
+    root, cache = checkout(tmp_path / "checkout"), tmp_path / "cache"
+    run(root, cache)
+    for path in cache.rglob(f"*.{kind}"):
+        path.write_bytes(b"" if kind == "nbi" else path.read_bytes()[:1000])
+    told = asked(root, cache)
+    assert told.stdout.split() == ["7", "1"]
+    assert told.stderr.startswith(f"damaged files in {cache}")
+    assert run(root, cache) == ["7", "0"]
+
+
+FULL = """
+import errno, os
+from numba.core.caching import IndexDataCacheFile
+
+def full(*_):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+IndexDataCacheFile._save_data = full
+"""
+
+
+def test_a_full_disk_stops_no_run_and_is_told_once(tmp_path: Path) -> None:
+    root, cache = checkout(tmp_path / "checkout"), tmp_path / "cache"
+    (root / "full.py").write_text(FULL + "from sim.loops import outer\n")
+    told = asked(root, cache, "full")
+    assert told.stdout.split() == ["7", "1"], told.stderr
+    (line,) = told.stderr.splitlines()
+    assert f"kept in {cache}, each run compiles again: No space left" in line
+
+
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("copy")
