@@ -28,7 +28,8 @@ def factorise(band: Floats) -> bool:
         size[2:3].ctypes,
         size[3:4].ctypes,
     )
-    return size[3] == 0
+    # LAPACK takes NaN for a pivot, and makes all that follow NaN
+    return size[3] == 0 and bool(np.isfinite(band[-1, 0]))
 
 
 @compiled

@@ -82,6 +82,16 @@ def test_nan_is_not_positive_definite(storage: Storage, place: int) -> None:
     assert not factorise(made)
 
 
+@pytest.mark.parametrize("width", [20, 120])
+@pytest.mark.parametrize("place", [(0, 0), (80, 3), (80, 20), (149, 0)])
+def test_nan_in_a_band_of_any_width_is_noticed(width: int, place: tuple[int, int]) -> None:
+    band = np.zeros((150, width + 1))
+    band[:, 0], band[:, 1] = 10.0, -1.0
+    assert banded.factorise(band.copy())
+    band[place] = np.nan
+    assert not banded.factorise(band)
+
+
 @pytest.mark.parametrize("storage", STORAGES)
 def test_every_dof_is_numbered_once(storage: Storage) -> None:
     for site, pairs in networks().values():
