@@ -33,7 +33,8 @@ def adapted(
     The estimate is the difference of the displacement to the embedded method of order 2, as the
     root mean square over the free dofs (rotations times the topology's rotation scale), mm. Nothing
     but the ends is kept of the solver's grid; the `first` step to try and the `largest` are in s;
-    steps end at `stops` (n,), ascending within the grid, s; `most` bounds their number.
+    steps end at `stops` (n,), ascending within the grid, s, but at one of those that lie near each
+    other; `most` bounds their number.
 
     Raises:
         SimulationError: the step became too short to go on, or there are too many.
@@ -56,14 +57,15 @@ def _adapted(
     most: float,
 ) -> ImplicitSolver:
     end = float(solver.times[-1])
-    ends = np.append(stops, end)
+    ends = time_grid.through(np.array([0.0, end]), stops)[1:]
     times, state = [0.0], (np.zeros(solver.topology.n_dofs), np.zeros(solver.topology.n_dofs))
     step = min(first, end)
     while times[-1] < end * (1 - 1e-12):
         step, left = min(step, largest), ends[np.searchsorted(ends, times[-1], "right")] - times[-1]
         step = left if step >= left else min(step, left / 2)
         reached, error = _attempt(solver, values, drive, times[-1], step, state)
-        if reached is not None and error <= tolerance:
+        accepted = reached is not None and error <= tolerance
+        if reached is not None and accepted:
             times.append(times[-1] + step)
             state = reached
         if len(times) > most:
@@ -71,7 +73,7 @@ def _adapted(
                 f"the step control has taken {len(times) - 1} steps by t = {times[-1]:.6g} s;"
                 " try integrator: explicit, or a looser accuracy"
             )
-        if step < 1e-9 * end:
+        if step < 1e-9 * end and not accepted:
             raise SimulationError(
                 f"the step control stalled at t = {times[-1]:.6g} s;"
                 " loosen the tolerance or smooth the drive",
