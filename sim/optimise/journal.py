@@ -108,7 +108,7 @@ class Journal:
         try:
             loss, gradient, aux = evaluate(x)
         except SimulationError as failure:
-            self._write(_encode(x, np.nan, np.zeros(0), np.zeros(0), str(failure)))
+            self._write(_encode(x, np.nan, np.zeros(0), np.zeros(0), failure))
             raise
         outcome = float(loss), np.array(gradient, dtype="<f8"), np.array(aux, dtype="<f8")
         self._write(_encode(x, *outcome, None))
@@ -143,15 +143,23 @@ class Journal:
         os.fsync(self._open.fileno())
 
 
-def _encode(x: Floats, loss: float, gradient: Floats, aux: Floats, failure: str | None) -> bytes:
-    shapes = {
+def _encode(
+    x: Floats, loss: float, gradient: Floats, aux: Floats, failure: SimulationError | None
+) -> bytes:
+    shapes: dict[str, object] = {
         "design": len(x),
         "gradient": len(gradient),
         "aux": list(aux.shape),
-        "failure": failure,
+        "failure": None if failure is None else str(failure),
     }
+    if failure is not None:
+        shapes |= {"step": _whole(failure.step), "unit": _whole(failure.unit)}
     numbers = np.concatenate([x, [loss], gradient, aux.ravel()]).astype("<f8")
     return json.dumps(shapes).encode() + b"\n" + numbers.tobytes()
+
+
+def _whole(number: int | None) -> int | None:
+    return None if number is None else int(number)  # JSON knows no integers of NumPy
 
 
 def _decode(payload: bytes) -> tuple[dict, Floats]:
@@ -167,6 +175,6 @@ def _design(payload: bytes) -> bytes:
 def _outcome(payload: bytes) -> tuple[float, Floats, Floats]:
     shapes, numbers = _decode(payload)
     if shapes["failure"] is not None:
-        raise SimulationError(shapes["failure"])
+        raise SimulationError(shapes["failure"], shapes.get("step"), shapes.get("unit"))
     _, loss, gradient, aux = np.split(numbers, np.cumsum([shapes["design"], 1, shapes["gradient"]]))
     return float(loss[0]), gradient.copy(), aux.reshape(shapes["aux"]).copy()

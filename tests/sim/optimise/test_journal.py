@@ -158,6 +158,21 @@ def test_aux_keeps_its_shape_and_bits(tmp_path: Path) -> None:
     assert aux_again.shape == (2, 2)
 
 
+def test_a_failure_read_back_knows_its_place(tmp_path: Path) -> None:
+    step, unit = np.array([7, 12])
+
+    def failing(_: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        raise SimulationError("the step failed", step, unit)
+
+    for replayed in (0, 1):
+        with (
+            Journal(tmp_path / "run", "a") as journal,
+            pytest.raises(SimulationError, match="the step failed") as failed,
+        ):
+            journal.wrap(failing)(np.zeros(2))
+        assert (failed.value.step, failed.value.unit, journal.replayed) == (7, 12, replayed)
+
+
 def test_a_journal_is_for_one_process_within_its_block(tmp_path: Path) -> None:
     with (
         Journal(tmp_path / "run", "a"),
