@@ -42,7 +42,8 @@ class Journal:
     recorded one in any bit means that the code or the machine has changed since: the rest of the
     journal is then of no use, it is cut off with a warning, and the run continues by computing.
 
-    The folder of `path` must exist; a journal of another `key` than the problem's is started anew.
+    The folder of `path` must exist; a journal of another `key` than the problem's is started anew,
+    with a warning, and what it held is kept in a file of that name and `.old`.
 
     Raises:
         JournalInUseError: on entering, if another process holds it.
@@ -67,6 +68,7 @@ class Journal:
             ) from None
         first = self._read()
         if first != self.key.encode():
+            self._put_aside()
             self._cut(0)
             self._write(self.key.encode())
         self.replayed = 0
@@ -81,6 +83,16 @@ class Journal:
         if self._file is not None:
             self._file.close()
             self._file = None
+
+    def _put_aside(self) -> None:
+        """Copies evaluations of another key to a file beside; none is read from there."""
+        kept = self.path.with_name(f"{self.path.name}.old")
+        content = self.path.read_bytes()
+        dropped = sum(1 for _ in iter(self._read, None))
+        if dropped:
+            kept.write_bytes(content)
+            what = "evaluations of another problem or program"
+            log.warning("%s: %d %s, kept as %s; starting anew", self.path, dropped, what, kept.name)
 
     def wrap(self, evaluate: Evaluate) -> Evaluate:
         """Gives ``evaluate`` a memory: reads its results back while the journal holds them."""

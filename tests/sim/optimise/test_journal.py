@@ -114,12 +114,20 @@ def test_interrupted_runs_resume_in_place(tmp_path: Path, method: Method, dies_a
     assert (tmp_path / "killed").read_bytes() == (tmp_path / "whole").read_bytes()
 
 
-def test_a_foreign_journal_is_started_anew(complete: Complete, tmp_path: Path) -> None:
+def test_a_foreign_journal_is_kept_beside_and_started_anew(
+    complete: Complete, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     data, _, calls = complete
     (tmp_path / "run").write_bytes(data)
     loss = Counted()
     assert run(tmp_path / "run", loss, key="b")[2] == 0
     assert loss.calls == calls
+    assert f"{calls} evaluations of another problem or program, kept as run.old" in caplog.text
+    assert (tmp_path / "run.old").read_bytes() == data
+    for key in "ab":
+        with Journal(tmp_path / "empty", key):
+            pass
+    assert not (tmp_path / "empty.old").exists()
     (tmp_path / "run").write_bytes(b"EVAL" + b"\xff" * 200)
     loss = Counted()
     run(tmp_path / "run", loss)
