@@ -14,10 +14,11 @@ scene = pressed(lattice, shortening=6.0).updated(
     region=np.flatnonzero(inner), kind="strain_energy", steps=4, cloak=np.flatnonzero(inner)
 )
 limits = sim.Limits(edge_length=5.0, block_angle=np.deg2rad(30.0), void_angle=0.0, gap=0.2)
+key = "5 x 5 squares, 6 mm in 4 steps"  # of the loss: with another one the journal starts anew
 with TemporaryDirectory() as folder:
     results = []
     for evaluations in (3, 6):  # as if the first run had been killed
-        with sim.optimise.Journal(Path(folder, "run.journal"), key="example") as journal:
+        with sim.optimise.Journal(Path(folder, "run.journal"), key=key) as journal:
             options = sim.SqpOptions(evaluations=evaluations)
             results.append(sim.minimise(scene, limits, options=options, journal=journal))
             replayed = journal.replayed

@@ -160,7 +160,8 @@ def minimise_worst(
         start: (n_variables,) design vector, mm; by default the initial structure.
         sqp: of the descents; its evaluations are those of all of them, without the searches.
         options: of the minimisation.
-        journal: of evaluations and searches, from which an interrupted run resumes exactly.
+        journal: of evaluations and searches, from which an interrupted run resumes exactly. Its key
+            is to name all that the losses depend on.
         callback: called with each evaluation of the set as it is recorded.
 
     Raises:

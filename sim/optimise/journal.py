@@ -42,8 +42,9 @@ class Journal:
     recorded one in any bit means that the code or the machine has changed since: the rest of the
     journal is then of no use, it is cut off with a warning, and the run continues by computing.
 
-    The folder of `path` must exist; a journal of another `key` than the problem's is started anew,
-    with a warning, and what it held is kept in a file of that name and `.old`.
+    The folder of `path` must exist. `key` is to name all that the loss depends on, as results are
+    read back by it and the design alone; a journal of another `key` than the problem's is started
+    anew, with a warning, and what it held is kept in a file of that name and `.old`.
 
     Raises:
         JournalInUseError: on entering, if another process holds it.

@@ -233,7 +233,9 @@ def minimise(
             where it is not to is drawn back towards that.
         options: of the method, which they choose; by default SQP with its own.
         plan: of `make_plan`; by default one from the initial structure.
-        journal: of evaluations, from which an interrupted run resumes exactly.
+        journal: of evaluations, from which an interrupted run resumes exactly. It tells scenes
+            apart by its key alone, which is to name all that the loss depends on. Constraints
+            under loads, of a snap margin or foil, are not in it and are computed again.
         paths: of equilibria, that evaluations of a static scene start from.
         callback: called with each evaluation as it is recorded.
 
