@@ -78,16 +78,16 @@ def test_both_triangles_of_a_cell_are_held_by_one_bar(built: Draft) -> None:
 SLANTED = (("cell_angle: 90 deg", "cell_angle: 60 deg"), ("[45 mm, 45 mm]", "[66 mm, 38 mm]"))
 
 
-@pytest.mark.parametrize(("sides", "angle"), [("left and right", 60.0), ("below and above", 0.0)])
+@pytest.mark.parametrize(("ends", "angle"), [("left and right", 60.0), ("below and above", 0.0)])
 def test_bars_run_along_the_sides_of_a_slanted_lattice(
-    built: Draft, sides: str, angle: float
+    built: Draft, ends: str, angle: float
 ) -> None:
     asked, specimen = built("kagome", *SLANTED)
-    if sides == "below and above":
-        rows = {unit.label: unit.row for unit in specimen.units}
+    if ends == "below and above":
+        rows = [unit.row for unit in specimen.units]
         low, high = (
-            tuple(label for label, row in rows.items() if row == end)
-            for end in (min(rows.values()), max(rows.values()))
+            tuple(unit.label for unit in specimen.units if unit.row == row)
+            for row in (min(rows), max(rows))
         )
         assert len(low) == len(high) == 12
         specimen = replace(specimen, clamped=low, driven=high)
