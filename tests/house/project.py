@@ -1,7 +1,6 @@
 """Reads the project's own source: its modules, what they import, and what they define."""
 
 import ast
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -9,6 +8,7 @@ from pathlib import Path
 from pipeline.runtime import ROOT
 
 PACKAGES = ("sim", "pipeline", "reports", "benchmarks")
+Import = tuple[ast.ImportFrom | ast.Import, str]
 
 
 @dataclass(frozen=True)
@@ -38,24 +38,36 @@ class Module:
     def tree(self) -> ast.Module:
         return _parsed(self.path)
 
-    def imports(self) -> Iterator[tuple[ast.ImportFrom | ast.Import, str]]:
+    def imports(self) -> tuple[Import, ...]:
         """Every import of the project: the statement, and each module or face it names."""
-        for node in ast.walk(self.tree):
-            if isinstance(node, ast.ImportFrom) and node.module:
-                names = [node.module]
-            elif isinstance(node, ast.Import):
-                names = [alias.name for alias in node.names]
-            else:
-                continue
-            yield from ((node, name) for name in names if name.split(".")[0] in PACKAGES)
+        return _imports(self.path)
 
-    def imported_modules(self) -> set[str]:
+    def imported_modules(self) -> frozenset[str]:
         """The modules of the project that are imported, through faces to where a name is from."""
-        found = set()
-        for node, base in self.imports():
-            names = [alias.name for alias in node.names] if isinstance(node, ast.ImportFrom) else []
-            found |= {base} | {source for name in names for source in resolved(base, name)}
-        return found & module_names()
+        return _imported_modules(self.path)
+
+
+@cache
+def _imports(path: Path) -> tuple[Import, ...]:
+    found: list[Import] = []
+    for node in ast.walk(_parsed(path)):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names = [node.module]
+        elif isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        else:
+            continue
+        found += ((node, name) for name in names if name.split(".")[0] in PACKAGES)
+    return tuple(found)
+
+
+@cache
+def _imported_modules(path: Path) -> frozenset[str]:
+    found: set[str] = set()
+    for node, base in _imports(path):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.ImportFrom) else []
+        found |= {base} | {source for name in names for source in resolved(base, name)}
+    return module_names() & found
 
 
 @cache
@@ -65,7 +77,8 @@ def _parsed(path: Path) -> ast.Module:
 
 def forget() -> None:
     """Drops the parsed trees: 100 MB, in a process that runs other tests after these."""
-    _parsed.cache_clear()
+    for known in (_parsed, _imports, _imported_modules, resolved):
+        known.cache_clear()
 
 
 @cache
@@ -83,7 +96,8 @@ def module_names() -> frozenset[str]:
     return frozenset(module.name for module in modules() if not module.is_face)
 
 
-def resolved(base: str, name: str) -> list[str]:
+@cache
+def resolved(base: str, name: str) -> tuple[str, ...]:
     """The modules that `from base import name` may lead to."""
     stub = ROOT.joinpath(*base.split("."), "__init__.pyi")
     sources = [f"{base}.{name}"]
@@ -91,4 +105,4 @@ def resolved(base: str, name: str) -> list[str]:
         for node in _parsed(stub).body:
             if isinstance(node, ast.ImportFrom) and any(a.name == name for a in node.names):
                 sources += [f"{base}.{node.module}"] if node.module else []
-    return sources
+    return tuple(sources)
