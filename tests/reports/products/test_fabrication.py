@@ -2,6 +2,7 @@ import base64
 import io
 import json
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -99,10 +100,9 @@ def test_the_same_package_gives_the_same_page(package: Path, page: str, tmp_path
 
 @cases("reports", "before, after, told")
 def test_a_package_of_another_version_makes_one_message(
-    tmp_path: Path, failing: Failing, before: str, after: str, told: str
+    tmp_path: Path, package: Path, failing: Failing, before: str, after: str, told: str
 ) -> None:
-    folder = tmp_path / "cloaked"
-    built.write(folder)
+    folder = shutil.copytree(package, tmp_path / "cloaked")
     path = folder / "manifest.json"
     path.write_text(path.read_text(encoding="utf-8").replace(before, after, 1), encoding="utf-8")
     words = ["--problem", built.PROBLEM, "--packages", folder]
