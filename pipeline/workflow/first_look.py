@@ -6,16 +6,20 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from pipeline.runtime import PREFIX, WORK
-from pipeline.workflow.studies import Study, check_names
+from pipeline.runtime import PREFIX, WORK, UserError
+from pipeline.workflow.studies import Study, check_names, joints
 
 
 def work(args: argparse.Namespace) -> None:
     """Shows one study.
 
     Raises:
-        UserError: the study, its preset or a recording has a name that none can have.
+        UserError: the study, its preset or a recording has a name that none can have, or a figure
+            of several studies has it.
     """
+    if members := joints().get(args.study):
+        remedy = f"check each by its own name: {', '.join(map(str, members))}"
+        raise UserError("a figure of several studies", key="study", value=args.study, remedy=remedy)
     study = Study.parse(args.study)
     check_names(study)
     sys.exit(_show(study, WORK))

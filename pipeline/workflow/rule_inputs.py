@@ -35,6 +35,8 @@ from pipeline.workflow.studies import (
     check_calibrations,
     check_names,
     check_targets,
+    check_words,
+    names_target,
     problem_of,
     studies,
     targets,
@@ -135,7 +137,7 @@ def figure_hash(wildcards: Wildcards) -> str:
 def check_problems(words: Collection[str]) -> None:
     """Ends the process with one clear message if a study that is asked for has a faulty problem.
 
-    Where no study is named, the first one is meant: it is the default target.
+    Where no target is named, the first study is meant: it is the default target.
 
     Snakemake would only find no rule to make its files, and count those that exist as up to date.
     """
@@ -143,7 +145,9 @@ def check_problems(words: Collection[str]) -> None:
         check_targets()
         if any("calibrat" in word for word in words):
             check_calibrations()
-        for study in asked_for(words) or studies()[:1]:
+        check_words(words)
+        first = [] if any(map(names_target, words)) else studies()[:1]
+        for study in asked_for(words) or first:
             check_names(study)
             check_measured_constants(problem_of(study), WORK / "experiments" / study.name)
         check_products(words)

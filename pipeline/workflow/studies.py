@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -150,6 +151,28 @@ def asked_for(words: Collection[str]) -> list[Study]:
         if study.name in names:
             found.append(study)
     return found
+
+
+def check_words(words: Collection[str]) -> None:
+    """Refuses a word of a command that is near a target, and names nothing itself.
+
+    Words that are near none may be those of options.
+
+    Raises:
+        UserError: naming the targets that may be meant.
+    """
+    known = {*targets(), *_rule_names()}
+    for word in filter(names_target, words):
+        plain = _without_product(word)
+        of_study = Study.parse(plain).name in known
+        if not of_study and (near := get_close_matches(plain, known, n=3, cutoff=0.75)):
+            remedy = f"did you mean {' or '.join(near)}?"
+            raise UserError(f"nothing is named {word}", key="target", value=word, remedy=remedy)
+
+
+def names_target(word: str) -> bool:
+    """Tells a word that may be a target's, and is no option, number or file."""
+    return re.fullmatch(r"[A-Za-z]\w*(@[\w.]*)?", word) is not None
 
 
 def _without_product(word: str) -> str:
