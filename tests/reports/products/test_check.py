@@ -136,6 +136,6 @@ def test_a_push_on_rows_of_hexagons_is_doubted(tmp_path: Path, angle: str, ampli
 def test_a_neck_is_doubted(tmp_path: Path) -> None:
     """Two voids' worth of units leave a column joined by one unit."""
     wide = "void: { polygon: { vertices: [[22 mm, -8 mm], [38 mm, -8 mm], [38 mm, 50 mm],"
-    wide += " [22 mm, 50 mm]] } }\ncloak: { disc: { radius: 37 mm } }\n"
+    wide += " [22 mm, 50 mm]] } }\ncloak: { disc: { radius: 29 mm } }\n"
     (told,) = doubted(static.write(tmp_path, wide + static.MIMIC, size=5, amplitude=3.0))
     assert told.startswith("necks of one unit: 1, the first at [2, 4]")
