@@ -48,6 +48,7 @@ class SideWalls:
         """Draws the silhouettes of units (units, 3) whose backs have moved against the faces."""
         offset = self._depth.offset(self._specimen.centre, pose)
         moved = np.linalg.norm(offset - self._offset, axis=1) > _MOVED * self._pixel
+        moved &= self._templates.reach > 0.0  # others were not seen at rest
         for unit in np.nonzero(moved)[0].tolist():
             outline = self._depth.silhouette(self._specimen.polygon(unit), offset[unit])
             inside = self._grid.signed_distance(outline)
@@ -70,10 +71,10 @@ class SideWalls:
 def _contrasts(silhouette: Singles, templates: Templates) -> Floats:
     """Brightness (units,) of silhouettes over what is around them, least squares by the weights."""
     weight = templates.weight
-    total = weight.sum(axis=(1, 2))
+    total = np.maximum(weight.sum(axis=(1, 2)), 1e-9)
     mean = (weight * silhouette).sum(axis=(1, 2)) / total
     apart = silhouette - mean[:, None, None]
     return np.asarray(
         (weight * apart * templates.brightness).sum(axis=(1, 2))
-        / (weight * apart**2).sum(axis=(1, 2))
+        / np.maximum((weight * apart**2).sum(axis=(1, 2)), 1e-9)
     )

@@ -102,12 +102,15 @@ def _smooth(value: Singles, low: float, high: float) -> Singles:
 def _templates(
     grid: TemplateGrid, brightness: Singles, weight: Singles, noise: float = 0.0
 ) -> Templates:
-    """Makes templates with the contrast that each has within its weight."""
-    total = weight.sum(axis=(1, 2))
+    """Makes templates with the contrast that each has within its weight.
+
+    One without weight, of a unit that no frame at rest shows, is never found.
+    """
+    total = np.maximum(weight.sum(axis=(1, 2)), 1e-9)
     mean = (brightness * weight).sum(axis=(1, 2)) / total
     square = ((brightness - mean[:, None, None]) ** 2 * weight).sum(axis=(1, 2)) / total
     distance = np.hypot(grid.x, grid.y)
-    reach = np.array([distance[mask > 0].max() for mask in weight])
+    reach = np.array([distance[mask > 0].max(initial=0.0) for mask in weight])
     contrast = np.sqrt(square)
     cells = classify_templates(brightness, weight, contrast, noise)
     nodes = brightness, weight, grid.half, grid.step

@@ -22,6 +22,7 @@ from pipeline.tracking.reference_frame.recognition import (
     check_outlines,
     recognise,
     units_in_frame,
+    units_out_of_frame,
 )
 from sim.core import Floats, Image
 
@@ -106,7 +107,10 @@ def _doubts(best: _Candidate, like: list[str]) -> Iterator[str]:
         yield f"structure: as many units fit {' and '.join(like)}; say which was built"
     if more := best.surplus:
         yield f"{more} patches of a unit's size that this structure does not have"
-    if missing := best.specimen.count - len(best.ways[0].unit):
+    gone = units_out_of_frame(best.specimen, best.calibration)
+    if outside := int(gone.sum()):
+        yield f"{outside} units lie outside the first frame and are not tracked: film all of them"
+    if missing := int((~gone).sum()) - int((~gone)[best.ways[0].unit].sum()):
         yield f"{missing} units were not found at first sight (orange in the picture); tracking"
         yield "  looks for them again"
     if doubt := ambiguity_text(best.ways):

@@ -138,6 +138,14 @@ def units_in_frame(specimen: SpecimenOutlines, calibration: CameraCalibration) -
     return np.asarray(((middle > reach) & (middle < last - reach)).all(axis=1))
 
 
+def units_out_of_frame(specimen: SpecimenOutlines, calibration: CameraCalibration) -> Mask:
+    """Marks units (units,) of which the picture shows nothing."""
+    middle = calibration.camera.project(specimen.centre)
+    reach = specimen.radius[:, None] / calibration.pixel
+    last = np.array(calibration.camera.size) - 1
+    return np.asarray(((middle < -reach) | (middle > last + reach)).any(axis=1))
+
+
 def _named(specimen: SpecimenOutlines, strange: Mask) -> str:
     ids = ", ".join(map(str, specimen.ids[strange][:8])) + (", ..." if strange.sum() > 8 else "")
     return f"{strange.sum()} units are hidden or not as the design has them ({ids})"

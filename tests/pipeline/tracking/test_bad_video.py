@@ -22,6 +22,8 @@ from pipeline.tracking.frames import (
 )
 from pipeline.tracking.geometry import outlines_of_design
 from pipeline.tracking.motion import Track, track_video
+from pipeline.tracking.motion.unit_looks import OUT_OF_FRAME
+from pipeline.tracking.reference_frame import RecordingSetup
 from tests.pipeline.tracking.conftest import CLIPS
 from tests.pipeline.virtual_lab.conftest import GRID, film_of
 from tests.tables import refused
@@ -50,6 +52,19 @@ def test_units_are_found_again_after_a_black_frame(clip: list[np.ndarray]) -> No
     assert np.isnan(track.displacement[2]).all()
     assert (track.quality[2] != 0).all()
     assert (track.quality[3:] == 0).all()
+
+
+@pytest.mark.parametrize("setup", [RecordingSetup(), RecordingSetup(thickness=3.0, distance=800.0)])
+def test_units_outside_the_first_frame_have_no_poses(
+    clip: list[np.ndarray], setup: RecordingSetup
+) -> None:
+    """They have no template; the others are tracked as ever."""
+    narrow = [np.ascontiguousarray(image[:, :250]) for image in clip]
+    track = track_video(timed(narrow), SPECIMEN, SCALE, setup=setup)
+    outside = (track.quality == OUT_OF_FRAME).all(axis=0)
+    assert outside.sum() >= 7
+    assert np.isnan(track.displacement[:, outside]).all()
+    assert (track.quality == 0).all(axis=0).sum() >= 35
 
 
 def test_a_video_from_behind_has_the_same_motions(clip: list[np.ndarray]) -> None:

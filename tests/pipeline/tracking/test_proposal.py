@@ -35,6 +35,12 @@ def test_a_mirrored_video_is_seen_as_such() -> None:
     assert "mirrored" in orientation_text(found.detection.camera)
 
 
+def test_units_outside_the_first_frame_are_told() -> None:
+    image = np.ascontiguousarray(next(film_of("bare").images())[:, :250])
+    doubts = proposal.propose(image, import_video.design(GRID), 1 / 0.365).doubts
+    assert any("units lie outside the first frame" in doubt for doubt in doubts)
+
+
 @pytest.mark.slow
 def test_a_proposal_leaves_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = str(tmp_path)
