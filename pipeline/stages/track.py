@@ -20,6 +20,7 @@ from pipeline.runtime import (
     sidecar_path,
     write_atomically,
 )
+from pipeline.tracking.detect import specimen_orientation
 from pipeline.tracking.frames import (
     SYNTHETIC_LABEL,
     LoadCellLog,
@@ -114,6 +115,7 @@ def _init(video: Path, args: argparse.Namespace) -> None:
         "design": os.path.relpath(args.design.resolve(), out.resolve().parent),
         "structure": found.structure,
         "pixel_size": f"{found.pixel_size:.4g} mm",
+        "mirrored": specimen_orientation(found.detection.camera)[1] or None,
         "window": {"start": "0 s"},
         "synthetic": rendered(video) or None,
     }

@@ -4,9 +4,10 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from pipeline.runtime import Picture
-from pipeline.tracking.detect.lattice_votes import locate_lattice
+from pipeline.tracking.detect.lattice_votes import Placement, locate_lattice
 from pipeline.tracking.geometry import Camera, SpecimenOutlines, fit_camera, fit_homography
 from sim.core import Floats, Image, Ints, Mask
 
@@ -21,6 +22,10 @@ _DOT = 0.25
 """Width of a median that a mark on a face does not survive, pitches."""
 _OTHER = 0.35
 """Orientations that differ by so much are others, rad."""
+_ASIDE = 0.5
+"""Distance of places that are others, pitches."""
+_MOST_SHIFTS = 24
+"""Places along the lattice that are tried of one of which a part is seen."""
 _SMALLEST = 0.25
 """Least area of a patch, over that of a unit: at the rim of a wide picture they are small."""
 _MARGIN = 1.0
@@ -43,6 +48,7 @@ class LatticeDetection:
     bright: bool  # whether the units are brighter than what is behind them
     missing: int  # number of units without one that should be in the picture
     surplus: int = 0  # number of blobs without a unit that go on with the lattice
+    unexplained: int = 0  # number of blobs that the rim cuts where it has no unit
 
     @property
     def score(self) -> int:
@@ -55,6 +61,11 @@ def specimen_orientation(camera: Camera) -> tuple[float, bool]:
     upward = camera.homography[:2, 1]
     turn = float(np.arctan2(-upward[0], -upward[1]))
     return turn, bool(np.linalg.det(camera.homography[:2, :2]) > 0)
+
+
+def turned_alike(turn: float, other: float) -> bool:
+    """Tells whether two angles, rad, are of one orientation."""
+    return bool(abs(np.angle(np.exp(1j * (turn - other)))) < _OTHER)
 
 
 def orientation_text(camera: Camera) -> str:
@@ -86,7 +97,8 @@ def detect_lattice(
 
     Returns:
         All ways of seeing it that match nearly as many units as the best: a lattice may look the
-        same turned. Upright comes first, mirrored last. Their cameras are without distortion.
+        same turned, and one of which a part is seen, a unit aside. Upright comes first, mirrored
+        last. Their cameras are without distortion.
     """
     extent = np.ptp(specimen.centre, axis=0) + 2 * specimen.radius.mean()
     most = min(image.shape[1] / extent[0], image.shape[0] / extent[1])
@@ -119,8 +131,8 @@ def _unmarked(image: Picture, pitch: float) -> Image:
 def _detections(
     image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool
 ) -> list[LatticeDetection]:
-    """Returns the best match of each orientation, at least one; upright first, mirrored last."""
-    patches = find_blobs(image, specimen, scale, bright)
+    """Returns matches, at least one, that differ in orientation or place; mirrored ones last."""
+    patches, cut = _blobs(image, specimen, scale, bright)
     size = (image.shape[1], image.shape[0])
     camera = Camera(np.eye(3), (np.array(size) - 1) / 2, np.zeros(2), size)
     nothing = LatticeDetection(
@@ -134,11 +146,13 @@ def _detections(
     found: list[tuple[bool, float, LatticeDetection]] = []
     for side in (1.0, -1.0):
         points = specimen.centre * [side, -1.0]
-        turns: list[float] = []
-        for one in locate_lattice(points, specimen.joint, patches, scale, inside):
-            if any(abs(np.angle(np.exp(1j * (one.turn - turn)))) < _OTHER for turn in turns):
+        others: list[Placement] = []
+        for one in locate_lattice(
+            points, specimen.joint, patches, scale, inside, most_seeds=_MOST_SHIFTS
+        ):
+            if any(_same_place(one, other, specimen.pitch * scale) for other in others):
                 continue
-            turns.append(one.turn)
+            others.append(one)
             matrix = fit_homography(specimen.centre[one.unit], patches[one.patch])
             seen = replace(camera, homography=matrix)
             areas = np.abs(np.linalg.det(seen.jacobian(specimen.centre[one.unit]))) / scale**2
@@ -154,10 +168,26 @@ def _detections(
                             blob=patches[one.patch],
                             missing=one.missing,
                             surplus=one.surplus,
+                            unexplained=_unexplained(cut, one, specimen.pitch * scale),
                         ),
                     )
                 )
     return [one for *_, one in sorted(found, key=lambda way: way[:2])] or [nothing]
+
+
+def _same_place(one: Placement, other: Placement, pitch: float) -> bool:
+    """Tells whether two placements have one orientation, and units in the same places."""
+    if not turned_alike(one.turn, other.turn):
+        return False
+    apart = np.linalg.norm(one.place - other.place, axis=1)
+    return bool(np.median(apart) < _ASIDE * pitch)
+
+
+def _unexplained(cut: Floats, placed: Placement, pitch: float) -> int:
+    """Counts blobs that the rim cuts (n, 2), px, and that are no unit's."""
+    if not len(cut):
+        return 0
+    return int((cdist(cut, placed.place).min(axis=1) > _ASIDE * pitch).sum())
 
 
 def with_distortion(specimen: SpecimenOutlines, detection: LatticeDetection) -> LatticeDetection:
@@ -169,6 +199,13 @@ def with_distortion(specimen: SpecimenOutlines, detection: LatticeDetection) -> 
 
 def find_blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool) -> Floats:
     """Returns centroids (n, 2) in px of patches of a unit's size that the rim does not cut."""
+    return _blobs(image, specimen, scale, bright)[0]
+
+
+def _blobs(
+    image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool
+) -> tuple[Floats, Floats]:
+    """Returns centroids, px, of patches of a unit's size: whole ones (n, 2), and cut ones."""
     pitch = specimen.pitch * scale
     window = int(pitch * 2) | 1
     signed = image.astype(np.float32) * (1 if bright else -1)
@@ -193,8 +230,9 @@ def find_blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright:
     good = (areas > _SMALLEST * specimen.area.min()) & (areas < 1.8 * specimen.area.max())
     left, top, wide, high = stats[1:, :4].T
     rows, columns = opened.shape
-    good &= (left > 0) & (top > 0) & (left + wide < columns) & (top + high < rows)
-    return np.asarray(centroids[1:][good], np.float64)
+    whole = (left > 0) & (top > 0) & (left + wide < columns) & (top + high < rows)
+    places = np.asarray(centroids[1:], np.float64)
+    return places[good & whole], places[good & ~whole]
 
 
 def _filled(mask: Image, largest: float) -> Image:

@@ -31,6 +31,8 @@ _FRONTIER = 1.7
 _TURNS_KEPT, _SHIFTS_KEPT = 0.6, 0.75
 """Votes of further candidates, over those of the best."""
 _MOST_SHIFTS, _MOST_SEEDS = 256, 3
+_AS_MANY = 0.95
+"""Matches of further seeds, over those of the best, where more than usual are asked for."""
 _SURE = 0.98
 """Score, over the number of units, after which no other shift is tried."""
 _NEAREST, _RIDGE = 8, 0.05
@@ -64,6 +66,7 @@ def locate_lattice(
     scale: float,
     inside: Inside,
     most_turn: float = np.pi,
+    most_seeds: int = _MOST_SEEDS,
 ) -> list[Placement]:
     """Places units among patches, not mirrored; the best placement comes first.
 
@@ -74,6 +77,7 @@ def locate_lattice(
         scale: of the patches' frame against the reference, roughly.
         inside: tells places (..., 2) that are in view.
         most_turn: the largest angle to look for, rad.
+        most_seeds: largest number of places to start from, of a turn, that match as much.
     """
     if len(patches) < _LEAST or len(points) < _LEAST:
         return []
@@ -92,7 +96,7 @@ def locate_lattice(
             _Growth(points, reach, turned + shift, patches, wide, match)
             for shift, match in zip(shifts, matches, strict=True)
         ]
-        for seed in _likeliest(seeds, inside):
+        for seed in _likeliest(seeds, inside, most_seeds):
             grown = seed.placement(factor, inside)
             if grown is not None:
                 found.append(grown)
@@ -101,7 +105,7 @@ def locate_lattice(
     return sorted(found, key=lambda one: -one.score)
 
 
-def _likeliest(seeds: list["_Growth"], inside: Inside) -> list["_Growth"]:
+def _likeliest(seeds: list["_Growth"], inside: Inside, most: int) -> list["_Growth"]:
     """Returns the seeds of best rank, and that of most matches less what is missing.
 
     A column alone in view matches each of the lattice's; what is missing beside it tells which.
@@ -109,7 +113,9 @@ def _likeliest(seeds: list["_Growth"], inside: Inside) -> list["_Growth"]:
     ranks = {seed: seed.rank(inside) for seed in seeds}
     ranked = sorted(seeds, key=ranks.__getitem__)
     net = min(ranked, key=lambda one: sum(ranks[one]), default=None)
-    return [*([net] if net else []), *(one for one in ranked[:_MOST_SEEDS] if one is not net)]
+    equal = [one for one in ranked[:most] if one.size >= _AS_MANY * ranked[0].size]
+    best = max(ranked[:_MOST_SEEDS], equal, key=len)
+    return [*([net] if net else []), *(one for one in best if one is not net)]
 
 
 def match_one_to_one(expected: Floats, found: Floats, gate: float) -> tuple[Ints, Ints]:

@@ -5,7 +5,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.runtime import Picture
-from pipeline.tracking.detect import LatticeDetection, with_distortion
+from pipeline.tracking.detect import (
+    LatticeDetection,
+    specimen_orientation,
+    turned_alike,
+    with_distortion,
+)
 from pipeline.tracking.fit import (
     PoseFits,
     PoseFitter,
@@ -31,7 +36,8 @@ _ROUNDS = 3
 _DISTANCES = (300.0, 400.0, 550.0, 750.0, 1000.0, 1350.0, 1800.0, 2500.0)
 """Of a camera whose distance is not told, mm."""
 _USUAL_BLUR = 1.0
-_ALIKE = 1.1
+_ALIKE, _ALIKE_ASIDE = 1.1, 1.3
+"""Unlikeness of orientations, and of places of one, that are as good as the best, over its own."""
 _FOUND = 0.5
 _SOME = 40
 """Units, about, that the blur is found on."""
@@ -142,7 +148,8 @@ def best_orientations(
 ) -> list[LatticeDetection]:
     """Keeps those of several ways to see a specimen that its outlines fit as well as any.
 
-    All are seen through one lens, which that way tells that matches most.
+    All are seen through one lens, which that way tells that matches most. Of places along the
+    lattice, what the rim of the picture cuts tells one for each orientation.
     """
     if len(detections) == 1:
         return detections
@@ -151,9 +158,29 @@ def best_orientations(
     grid = TemplateGrid(specimen, 1 / pixel, (3 * _USUAL_BLUR + 2) * pixel)
     templates = outline_templates(grid, _USUAL_BLUR * pixel, pixel, detections[0].bright)
     wrong = [_unlikeness(image, specimen, templates, lens, one) for one in detections]
-    return [
-        one for one, found in zip(detections, wrong, strict=True) if found <= _ALIKE * min(wrong)
-    ]
+    kept = []
+    for places in _by_orientation(detections):
+        least = min(wrong[place] for place in places)
+        if least <= _ALIKE * min(wrong):
+            near = [place for place in places if wrong[place] <= _ALIKE_ASIDE * least]
+            best = min(near, key=lambda place: (detections[place].unexplained, wrong[place]))
+            kept.append(detections[best])
+    return kept
+
+
+def _by_orientation(detections: list[LatticeDetection]) -> list[list[int]]:
+    """Groups numbers of detections that see a specimen turned and mirrored alike."""
+    groups: list[list[int]] = []
+    for number, one in enumerate(detections):
+        turn, behind = specimen_orientation(one.camera)
+        for group in groups:
+            other = specimen_orientation(detections[group[0]].camera)
+            if behind == other[1] and turned_alike(turn, other[0]):
+                group.append(number)
+                break
+        else:
+            groups.append([number])
+    return groups
 
 
 def _unlikeness(
@@ -163,10 +190,14 @@ def _unlikeness(
     lens: Camera,
     detection: LatticeDetection,
 ) -> float:
-    """Multiplies residuals of outlines by rotations: outlines of others are turned to fit."""
+    """Multiplies residuals of outlines by rotations: outlines of others are turned to fit.
+
+    Units without a blob of their own do not count: those at the rim differ from place to place.
+    """
     camera = lens.facing(specimen.centre[detection.unit], detection.blob)
     fitter = PoseFitter(camera, templates)
-    fits = fitter.fit(image, *fitter.start(_gain(image)))
+    everywhere = fitter.fit(image, *fitter.start(_gain(image)))
+    fits = PoseFits(*(values[detection.unit] for values in everywhere))
     found = np.isfinite(fits.pose[:, 2])
     if found.mean() < _FOUND:
         return np.inf

@@ -5,14 +5,23 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from pipeline.tracking.detect import orientation_text
+from pipeline.tracking.detect import orientation_text, specimen_orientation
 from pipeline.tracking.frames import import_video, read_frames, recording
-from pipeline.tracking.reference_frame import proposal
+from pipeline.tracking.geometry import outlines_of_design
+from pipeline.tracking.reference_frame import (
+    RecordingSetup,
+    calibrate_camera,
+    proposal,
+    recognise,
+)
 from tests.pipeline.tracking.conftest import CLIPS
 from tests.pipeline.virtual_lab.conftest import GRID, film_of
+
+SCALE = 1 / 0.365
 
 
 def first(name: str) -> np.ndarray:
@@ -37,8 +46,51 @@ def test_a_mirrored_video_is_seen_as_such() -> None:
 
 def test_units_outside_the_first_frame_are_told() -> None:
     image = np.ascontiguousarray(next(film_of("bare").images())[:, :250])
-    doubts = proposal.propose(image, import_video.design(GRID), 1 / 0.365).doubts
+    doubts = proposal.propose(image, import_video.design(GRID), SCALE).doubts
     assert any("units lie outside the first frame" in doubt for doubt in doubts)
+
+
+def test_a_proposal_says_that_it_is_mirrored(tmp_path: Path) -> None:
+    design = tmp_path / "design.nc"
+    origin = {"problem": "{}", "problem_hash": "", "parents": "{}"}
+    datasets.write(import_video.design(GRID), design, "design", origin)
+    words = ["--out-dir", str(tmp_path), "--design", str(design)]
+    for name, step in (("plain", 1), ("behind", -1)):
+        (tmp_path / name).mkdir()
+        image = np.ascontiguousarray(next(film_of("bare").images())[:, ::step])
+        assert cv2.imwrite(str(tmp_path / name / "a1.png"), image)
+        assert run_stage("track", ["init", str(tmp_path / name), *words]) == 0
+        made = yaml.safe_load((tmp_path / f"{name}.yaml").read_text(encoding="utf-8"))
+        assert made.get("mirrored") == {"plain": None, "behind": True}[name]
+
+
+def part_of_the_film(left: int, right: int) -> tuple[np.ndarray, np.ndarray]:
+    """Columns of the first frame, and where each unit's middle lies in them, px."""
+    whole = next(film_of("bare").images())
+    specimen = outlines_of_design(import_video.design(GRID))
+    seen = calibrate_camera(
+        whole, specimen, recognise(whole, specimen, SCALE, RecordingSetup())[0], RecordingSetup()
+    ).camera.project(specimen.centre)
+    return np.ascontiguousarray(whole[:, left:right]), seen - [left, 0]
+
+
+@pytest.mark.parametrize("columns", [(0, 264), (0, 250), (65, 320), (64, 264)])
+def test_of_places_along_the_lattice_the_rim_tells(columns: tuple[int, int]) -> None:
+    """Bias and polarity of a part of the lattice fit, a unit aside, one that is mirrored."""
+    image, wanted = part_of_the_film(*columns)
+    found = proposal.propose(image, import_video.design(GRID))
+    assert orientation_text(found.detection.camera) == "upright"
+    seen = found.detection.camera.project(found.specimen.centre)
+    inside = ((wanted > 20) & (wanted < [image.shape[1] - 21, 299])).all(axis=1)
+    np.testing.assert_allclose(seen[inside], wanted[inside], atol=2.0)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_part_of_a_lattice_is_seen_as_the_recording_says(mirrored: bool) -> None:
+    image, _ = part_of_the_film(0, 264)
+    specimen = outlines_of_design(import_video.design(GRID))
+    ways = recognise(image, specimen, SCALE, RecordingSetup(mirrored=mirrored))
+    assert {specimen_orientation(way.camera)[1] for way in ways} == {mirrored}
 
 
 @pytest.mark.slow
