@@ -13,7 +13,7 @@ from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion.exposure_meter import ExposureMeter
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.prediction import Neighbourhood, latest_velocity
-from pipeline.tracking.motion.unit_looks import SHARE, SHARE_KNOWN, UnitLooks
+from pipeline.tracking.motion.unit_looks import SHARE, SHARE_KNOWN, UnitLooks, white_share
 from sim.core import Floats, Ints, Mask, Reals
 
 LOG = logging.getLogger(__name__)
@@ -41,6 +41,8 @@ _MOST_TURN = np.deg2rad(45.0)
 """Within a frame of a specimen in sight: half of the turn that leaves squares as they were."""
 _CLOSE = 0.5
 """Two units nearer to each other than this part of their least distance at rest are one."""
+_FACE = 0.5
+"""Part of a unit's reach within which it shows its face alone."""
 _ROUNDS = 40
 _RETRIES = 4
 
@@ -143,7 +145,7 @@ class Tracker:
         if self._out_of_sight and good.sum() <= _HALF * self._relocaliser.in_view(self._pose).sum():
             good[:] = False  # a few may be others, a unit aside
         good &= ~self._neighbours.collisions(fits.pose, good, _CLOSE)
-        quality = self._known.reasons(fits, good, self._relocaliser.in_view(self._pose))
+        quality = self._reasons(image, fits, good)
         if self._slopes is not None and not first:
             self._slopes.apply(fits, good)
         for values in fits:
@@ -214,6 +216,14 @@ class Tracker:
         if sharp and not self.exposure.time and self._interval > 0:
             quick = np.linalg.norm((fits.pose - self._pose)[:, :2], axis=1) > _QUICK * self._pixel
         return self._known.accepted(fits, self._photometry, share, quick)
+
+    def _reasons(self, image: Picture, fits: PoseFits, good: Mask) -> Ints:
+        """Says why units are missing, by what the frame shows where they were last."""
+        lost, white = np.flatnonzero(~good), np.zeros(len(good))
+        middle = self._fitter.camera.project(self._centre[lost] + self._pose[lost, :2])
+        reach = _FACE * self._fitter.templates.reach[lost] / self._pixel
+        white[lost] = white_share(image, middle, reach)
+        return self._known.reasons(fits, good, self._relocaliser.in_view(self._pose), white)
 
     def _complete(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Looks for what is missing, where the good ones say."""

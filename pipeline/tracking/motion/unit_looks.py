@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from pipeline.runtime import Picture
 from pipeline.tracking.fit import PoseFits, Templates
 from sim.core import Floats, Ints, Mask
 
@@ -20,7 +21,10 @@ _GAIN = (0.12, 4.0)
 """Gain, against the first frame's, between which a unit can be seen."""
 _SHARP = 0.7
 """Part of a unit that has to be seen where its motion may have blurred it."""
-_GLARE = 0.4
+_FADED = 0.4
+"""Gain, against the first frame's, of what is no longer the unit but something before it."""
+_WHITE, _GLARING = 234.0, 0.4
+"""Level from which pixels are saturated, which in a video may be 235; part of them in glare."""
 _MISFIT = 0.15
 """Residuals of a good fit, in contrasts of the unit; or so many times the first frame's: """
 _NOISIER = 4.0
@@ -50,6 +54,8 @@ class UnitLooks:
         self.noise = np.maximum(noise, sensor_noise / self._gain)
         self._limit = np.maximum(_NOISIER * self.noise, _MISFIT * templates.contrast)
         self._seen = seen
+        white = ((templates.brightness >= _WHITE) * templates.weight).sum(axis=(1, 2))
+        self._white = white / np.maximum(templates.weight.sum(axis=(1, 2)), 1e-9)
 
     def accepted(
         self, fits: PoseFits, photometry: Floats, share: float, quick: Mask | None
@@ -72,13 +78,34 @@ class UnitLooks:
         lit = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
         return np.isfinite(fits.pose[:, 0]) & settled & fitting & lit & self._seen
 
-    def reasons(self, fits: PoseFits, good: Mask, inside: Mask) -> Ints:
-        """Says of each unit that it is `good`, or why it is missing; `inside` are in view."""
+    def reasons(self, fits: PoseFits, good: Mask, inside: Mask, white: Floats) -> Ints:
+        """Says of each unit that it is `good`, or why it is missing.
+
+        `inside` are in view; `white` is the part of their pixels that is saturated.
+        """
         relative = fits.photometry[:, 0] / self._gain
         reasons = np.full(len(good), HIDDEN)
         reasons[np.isfinite(fits.pose[:, 0]) & (fits.share > SHARE)] = POOR_FIT
-        reasons[(relative < _GLARE) & (fits.photometry[:, 1] > 0)] = GLARE
+        reasons[(relative < _FADED) & (fits.photometry[:, 1] > 0)] = HIDDEN
+        reasons[white > self._white + _GLARING] = GLARE
         reasons[~self._seen] = HIDDEN
         reasons[~inside] = OUT_OF_FRAME
         reasons[good] = GOOD
         return reasons
+
+
+def white_share(image: Picture, middle: Floats, reach: Floats) -> Floats:
+    """Measures the part of saturated pixels in squares about places (units, 2), px.
+
+    Args:
+        image: the frame.
+        middle: of the squares; what lies outside the frame has none.
+        reach: (units,) half a side.
+    """
+    share = np.zeros(len(middle))
+    low = np.maximum(np.floor(middle - reach[:, None]), 0).astype(int)
+    high = np.maximum(np.ceil(middle + reach[:, None]) + 1, 0).astype(int)
+    for unit, ((left, top), (right, bottom)) in enumerate(zip(low, high, strict=True)):
+        part = image[top:bottom, left:right]
+        share[unit] = np.mean(part >= _WHITE) if part.size else 0.0
+    return share

@@ -22,7 +22,7 @@ from pipeline.tracking.frames import (
 )
 from pipeline.tracking.geometry import outlines_of_design
 from pipeline.tracking.motion import Track, track_video
-from pipeline.tracking.motion.unit_looks import OUT_OF_FRAME
+from pipeline.tracking.motion.unit_looks import GLARE, HIDDEN, OUT_OF_FRAME
 from pipeline.tracking.reference_frame import RecordingSetup
 from tests.pipeline.tracking.conftest import CLIPS
 from tests.pipeline.virtual_lab.conftest import GRID, film_of
@@ -74,6 +74,24 @@ def test_a_video_from_behind_has_the_same_motions(clip: list[np.ndarray]) -> Non
     assert "mirrored" in orientation_text(behind.calibration.camera)
     apart = behind.displacement - plain.displacement
     assert np.sqrt(np.mean(apart[..., :2] ** 2)) / plain.calibration.pixel < 0.01
+
+
+@pytest.mark.parametrize(
+    ("level", "reason"), [(40.0, HIDDEN), (120.0, HIDDEN), (190.0, HIDDEN), (255.0, GLARE)]
+)
+def test_glare_is_told_from_what_hides_units(
+    clip: list[np.ndarray], level: float, reason: int
+) -> None:
+    """Glare is saturated, and a hand in its light is not."""
+    noise = np.random.default_rng(0).normal(0.0, 2.0, clip[0].shape)
+    rows, columns = np.indices(clip[0].shape)
+    covered = np.hypot(columns - 120, rows - 160) < 60
+    shown = np.where(covered, level + noise, clip[1]).clip(0, 255).astype(np.uint8)
+    track = followed(timed([clip[0], clip[0], shown]))
+    place = track.calibration.camera.project(SPECIMEN.centre)
+    under = np.hypot(*(place - [120, 160]).T) < 45
+    assert under.sum() >= 4
+    assert (track.quality[2, under] == reason).all()
 
 
 def test_pictures_of_16_bit_in_a_folder_are_a_video(tmp_path: Path, clip: list[np.ndarray]) -> None:
