@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem import Problem
-from pipeline.problem.sections import selected_units, single_drives
+from pipeline.problem.sections import TimeSeriesDrive, selected_units, single_drives
+from reports.figures.loading_path.drive_directions import drive_directions
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ def drive_response(problem: Problem) -> DriveResponse:
 
 def driven_displacement(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     """Finds the mean displacement in mm of the first drive's units along its direction."""
-    return _along(_driven(problem, response["displacement"]).mean("unit"), response)
+    return _along(problem, _driven(problem, response["displacement"]).mean("unit"), response)
 
 
 def _turn(problem: Problem, response: xr.Dataset) -> xr.DataArray:
@@ -62,18 +63,25 @@ def _moment(problem: Problem, response: xr.Dataset) -> xr.DataArray:
 
 def _force(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     """Finds the force along the drive on all of the units together, N."""
-    return _along(_driven(problem, response["reaction_force"]).sum("unit"), response)
+    return _along(problem, _driven(problem, response["reaction_force"]).sum("unit"), response)
 
 
 def _driven(problem: Problem, values: xr.DataArray) -> xr.DataArray:
     """Selects values of the first drive's units."""
-    drive = single_drives(problem.drive)[0]
-    return values.sel(unit=list(selected_units(drive.units, problem.lattice)))
+    return values.sel(unit=_units(problem))
 
 
-def _along(vector: xr.DataArray, response: xr.Dataset) -> xr.DataArray:
-    """Returns the part (structure, case, time) along the drive's direction."""
-    angle = np.radians(response["direction"])
+def _units(problem: Problem) -> list[int]:
+    return list(selected_units(single_drives(problem.drive)[0].units, problem.lattice))
+
+
+def _along(problem: Problem, vector: xr.DataArray, response: xr.Dataset) -> xr.DataArray:
+    """Returns the part (structure, case, time) along the first drive's direction."""
+    direction, drive = response["direction"], single_drives(problem.drive)[0]
+    if isinstance(drive, TimeSeriesDrive):  # of which the dataset tells no direction
+        found = drive_directions(drive, response, _units(problem))
+        direction = xr.full_like(direction, np.degrees(next(iter(found), 0.0)))
+    angle = np.radians(direction)
     along: xr.DataArray = np.cos(angle) * vector.sel(dof="ux") + np.sin(angle) * vector.sel(
         dof="uy"
     )

@@ -13,12 +13,11 @@ from pipeline.problem.outlines import Outline
 from pipeline.problem.sections import (
     Region,
     RotationDrive,
-    SingleDrive,
-    TimeSeriesDrive,
     TorqueDrive,
     single_drives,
 )
 from reports.base import style
+from reports.figures.loading_path.drive_directions import drive_directions, swings
 from reports.panels import (
     CLAMP_TINT,
     CLOAK_TINT,
@@ -82,7 +81,12 @@ def rest_panel(axes: Axes, problem: Problem, response: xr.Dataset, name: str) ->
         _draw_outlines(axes, problem.void.outlines(problem.lattice.centre_site))
     for drive in single_drives(problem.drive):
         units = list(selected_units(drive.units, problem.lattice))
-        _load_arrows(axes, structure, _ways(drive, response, units), structure.centroid[units])
+        ends = structure.centroid[units]
+        if isinstance(drive, TorqueDrive | RotationDrive):
+            _turning_signs(axes, "\u21ba" if drive.amplitude > 0 else "\u21bb", ends)
+            continue
+        look = "<|-|>" if swings(drive, response, units) else "-|>"
+        _load_arrows(axes, structure, drive_directions(drive, response, units), ends, look)
 
 
 def _draw_outlines(axes: Axes, outlines: tuple[Outline, ...]) -> None:
@@ -92,40 +96,32 @@ def _draw_outlines(axes: Axes, outlines: tuple[Outline, ...]) -> None:
         axes.plot(*ring.T, color=style.ALTERED, lw=0.7, zorder=6)
 
 
-def _ways(drive: SingleDrive, response: xr.Dataset, units: list[int]) -> Sequence[float] | str:
-    """Returns directions of a drive, rad, or a sign of its sense of turning.
-
-    A measured motion goes along its largest displacement.
-    """
-    if isinstance(drive, TorqueDrive | RotationDrive):
-        return "\u21ba" if drive.amplitude > 0 else "\u21bb"
-    if not isinstance(drive, TimeSeriesDrive):
-        return drive.directions
-    moved = response["displacement"].isel(structure=0, case=0, unit=units[0])
-    way = moved.sel(dof=["ux", "uy"]).transpose("time", "dof").values
-    x, y = way[np.hypot(*way.T).argmax()]
-    return (np.arctan2(y, x),) if np.hypot(x, y) > 0.0 else ()
-
-
 def _reach(structure: RigidUnits) -> float:
     """Computes the length of the drive's arrows, mm."""
     size = float(np.ptp(structure.centroid[structure.present], axis=0).max())
     return float(max(0.055 * size, 0.8 * size / np.sqrt(structure.present.sum())))
 
 
+def _turning_signs(axes: Axes, sign: str, ends: Floats) -> None:
+    """Draws the sense of turning of a drive into some of its units."""
+    for x, y in _some(ends):
+        axes.text(x, y, sign, color=style.ALTERED, ha="center", va="center", zorder=7)
+
+
 def _load_arrows(
-    axes: Axes, structure: RigidUnits, ways: Sequence[float] | str, ends: Floats
+    axes: Axes, structure: RigidUnits, ways: Sequence[float], ends: Floats, look: str
 ) -> None:
-    """Draws arrows onto some of the driven units, along ways (rad), or a sign in the units."""
-    few = np.unique(np.linspace(0, len(ends) - 1, 5).round().astype(int))
+    """Draws arrows onto some of the driven units, along ways (rad)."""
     reach = _reach(structure)
-    shown = ends[few[1:-1] if len(few) == 5 else few]
-    if isinstance(ways, str):
-        for end in shown:
-            axes.text(end[0], end[1], ways, color=style.ALTERED, ha="center", va="center", zorder=7)
-        return
     for angle in ways:
         along = np.array([np.cos(angle), np.sin(angle)])
-        for end in shown:
+        for end in _some(ends):
             start, tip = end - 1.3 * reach * along, end - 0.3 * reach * along
-            arrow(axes, start, tip, style.ALTERED, zorder=7, clip_on=False)
+            made = arrow(axes, start, tip, style.ALTERED, zorder=7, clip_on=False)
+            made.set_arrowstyle(look)
+
+
+def _some(ends: Floats) -> Floats:
+    """Selects at most three of the places (n, 2) of driven units."""
+    few = np.unique(np.linspace(0, len(ends) - 1, 5).round().astype(int))
+    return ends[few[1:-1] if len(few) == 5 else few]

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.patches import FancyArrowPatch
+from matplotlib.patches import ArrowStyle, FancyArrowPatch
 
 from pipeline.comparison import middle_units
 from pipeline.posing import law_comparison
-from pipeline.problem import Output
+from pipeline.problem import Output, selected_units
 from pipeline.problem.sections import ForceDrive, Paper, RotationDrive, TimeSeriesDrive, TorqueDrive
 from reports.base import style
 from reports.facts import checks, fact_records
@@ -343,19 +343,49 @@ def test_the_page_is_whole(shield: StudyResults, tmp_path: Path) -> None:
     assert len(html.encode()) < 6_000_000
 
 
-def test_a_measured_motion_has_arrows_along_its_largest_displacement(smile: StudyResults) -> None:
+@pytest.mark.parametrize(
+    ("course", "angle", "look"),
+    [
+        ((0.0, 1.0, 3.0), 180.0, "-|>"),
+        ((0.0, -1.0, -3.0), 0.0, "-|>"),
+        ((0.0, 3.0, -2.9), 0.0, "<|-|>"),
+    ],
+)
+@pytest.mark.parametrize("turn", [0.0, 90.0])
+def test_a_measured_motion_is_answered_along_its_largest_displacement(
+    smile: StudyResults, course: tuple[float, ...], angle: float, look: str, turn: float
+) -> None:
+    """The arrows lie along it too; one that goes to both sides has two heads."""
     drive = TimeSeriesDrive.model_validate(
         {"kind": "time_series", "units": "right", "file": "shaker.csv"}
     )
     asked = smile.problem.model_copy(update={"drive": drive})
+    response = smile.response.isel(time=slice(0, 3)).copy(deep=True)
+    way, across = np.radians(180.0 + turn), np.radians(90.0 + turn)
+    for key, far in (("displacement", np.array(course)), ("reaction_force", np.ones(3))):
+        moved = np.stack([far * np.cos(way), far * np.sin(way), 0.0 * far], axis=-1)
+        response[key] = moved_as(response[key], moved)
+    response["reaction_force"] += 5.0 * xr.DataArray(
+        [np.cos(across), np.sin(across), 0.0], dims="dof"
+    )
+    forces = drive_response(asked).of(response).isel(structure=0, case=0)
+    shown = np.radians(angle + turn)
+    driven = len(selected_units(drive.units, asked.lattice))
+    np.testing.assert_allclose(forces, driven * np.cos(shown - way), atol=1e-9)
     axes = Figure().add_subplot()
-    rest_panel(axes, asked, smile.response, "altered")
+    rest_panel(axes, asked, response, "altered")
     arrows = [each for each in axes.patches if isinstance(each, FancyArrowPatch)]
     assert len(arrows) == 3
     for each in arrows:
-        (x, y), (end, same) = vars(each)["_posA_posB"]
-        assert x > end
-        assert y == pytest.approx(same)
+        start, end = np.array(vars(each)["_posA_posB"])
+        along = (end - start) / np.linalg.norm(end - start)
+        np.testing.assert_allclose(along, [np.cos(shown), np.sin(shown)], atol=1e-9)
+        assert type(each.get_arrowstyle()) is ArrowStyle.get_styles()[look]
+
+
+def moved_as(values: xr.DataArray, course: np.ndarray) -> xr.DataArray:
+    """Values in which all units follow one course (time, dof)."""
+    return xr.zeros_like(values) + xr.DataArray(course, dims=("time", "dof"))
 
 
 @pytest.mark.parametrize(
