@@ -65,8 +65,10 @@ def _at_rest(asked: Problem, scene: Scene) -> xr.Dataset:
     }
     motion = scene.loads.motions[0]
     if isinstance(motion, TimeSeries):
-        course = np.asarray(motion.motion)[None, None, :, None]
-        whole = np.broadcast_to(course, (1, 1, len(motion.times), intact.n_units, 3))
+        read = np.asarray(motion.times)  # which may go on after the end
+        times = np.append(read[read < asked.horizon_time], asked.horizon_time)
+        course = np.asarray(motion(times))[None, None, :, None]
+        whole = np.broadcast_to(course, (1, 1, len(times), intact.n_units, 3))
         variables["displacement"] = (("structure", "case", "time", "unit", "dof"), whole)
     coordinates = {
         **unit_coordinates(intact),

@@ -2,7 +2,9 @@ from collections.abc import Callable
 from pathlib import Path
 from string import Template
 
+import numpy as np
 import pytest
+import xarray as xr
 from PIL import Image, ImageDraw
 
 from pipeline.posing import cost_line, doubts, scene_of
@@ -10,6 +12,7 @@ from pipeline.problem import load
 from pipeline.problem.sections import Robust
 from pipeline.runtime import ROOT
 from reports.__main__ import main
+from reports.products import check
 from sim.scene import estimate_cost, sample_times
 from tests.pipeline import static
 
@@ -32,6 +35,26 @@ def test_a_picture_and_a_line_of_cost(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "warning" not in told
     with Image.open(tmp_path / "out/check.png") as picture:
         assert min(picture.size) > 500
+
+
+def test_a_measured_motion_ends_where_the_study_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It goes on the other way afterwards, and further."""
+    path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
+    text = path.read_text()
+    series = (
+        "drive: { kind: time_series, units: right, file: push.csv }\nhorizon: { duration: 0.4 s }"
+    )
+    begin, end = text.index("drive:"), text.index("\nconstraints:")
+    path.write_text(text[:begin] + series + text[end:])
+    lines = "time (s),ux (mm),uy (mm),theta (rad)\n0,0,0,0\n0.5,-1,0,0\n1,9,0,0\n"
+    (tmp_path / "push.csv").write_text(lines)
+    shown: list[xr.Dataset] = []
+    monkeypatch.setattr(check, "rest_panel", lambda *given: shown.append(given[2]))
+    assert main(["check", "--problem", str(path), "--out-dir", str(tmp_path / "out")]) == 0
+    moved = shown[0]["displacement"].isel(structure=0, case=0, unit=0).sel(dof="ux")
+    np.testing.assert_allclose(moved, [0.0, -0.8])
 
 
 def test_measured_constants_are_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
