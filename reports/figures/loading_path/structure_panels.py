@@ -85,8 +85,8 @@ def rest_panel(axes: Axes, problem: Problem, response: xr.Dataset, name: str) ->
         if isinstance(drive, TorqueDrive | RotationDrive):
             _turning_signs(axes, "\u21ba" if drive.amplitude > 0 else "\u21bb", ends)
             continue
-        look = "<|-|>" if swings(drive, response, units) else "-|>"
-        _load_arrows(axes, structure, drive_directions(drive, response, units), ends, look)
+        ways, both = drive_directions(drive, response, units), swings(drive, response, units)
+        _load_arrows(axes, ways, ends, _reach(structure), both=both)
 
 
 def _draw_outlines(axes: Axes, outlines: tuple[Outline, ...]) -> None:
@@ -109,16 +109,16 @@ def _turning_signs(axes: Axes, sign: str, ends: Floats) -> None:
 
 
 def _load_arrows(
-    axes: Axes, structure: RigidUnits, ways: Sequence[float], ends: Floats, look: str
+    axes: Axes, ways: Sequence[float], ends: Floats, reach: float, *, both: bool
 ) -> None:
-    """Draws arrows onto some of the driven units, along ways (rad)."""
-    reach = _reach(structure)
+    """Draws arrows onto some of the driven units along ways (rad); with two heads for `both`."""
+    far = 1.9 if both else 1.3  # room for a second head
     for angle in ways:
         along = np.array([np.cos(angle), np.sin(angle)])
         for end in _some(ends):
-            start, tip = end - 1.3 * reach * along, end - 0.3 * reach * along
+            start, tip = end - far * reach * along, end - 0.3 * reach * along
             made = arrow(axes, start, tip, style.ALTERED, zorder=7, clip_on=False)
-            made.set_arrowstyle(look)
+            made.set_arrowstyle("<|-|>" if both else "-|>")
 
 
 def _some(ends: Floats) -> Floats:
