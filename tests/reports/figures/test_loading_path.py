@@ -1,5 +1,6 @@
 import dataclasses
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
@@ -341,6 +342,11 @@ def test_the_page_is_whole(shield: StudyResults, tmp_path: Path) -> None:
     assert "as run" in html
     assert "vertices off by up to ±3 % of s (5 copies)" in html
     assert len(html.encode()) < 6_000_000
+    robust = html.split('<table class="robust">')[1].split("</table>")[0]
+    cells = re.findall(r'<td class="ours" data-label="([^"]+)">[^<]+</td>', robust)
+    of = ("Mean |θ| in the region of interest", "Loss")
+    once = [label for each in of for label in (f"{each}: nominal, or median", "95 % keep below")]
+    assert cells == once * (len(cells) // 4)
 
 
 @pytest.mark.parametrize(
