@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
@@ -123,19 +123,15 @@ def bill_rows(
     yield _dots(specimen)
     yield from _foil(specimen, settings, contents)
     mass, volume = _sum(units, "mass"), _sum(units, "volume")
-    solid = volume * settings.solid_density * _GRAMS
-    fill = f"print {100 * infill:.0f} % full"
-    if mass > solid:
-        fill = "less than the problem's density asks for"
-    note = f"{settings.material}; {solid:.1f} g if solid: {fill}"
+    labels = {unit.id for unit in units}
+    plates = [prints[file] for file in prints if labels.issuperset(contents[file])]
+    note = _mass_words(mass, volume, _whole(plates), settings, infill)
     yield BillRow("total", "units", len(units), volume=volume, mass=mass, note=note)
     mass, volume = _sum(shims, "mass"), _sum(shims, "volume")
     count = sum(row.count for row in shims)
     yield BillRow("total", "shims", count, volume=volume, mass=mass, note="polyester")
-    every = prints.values()
-    whole = PrintEstimate(sum(p.seconds for p in every), sum(p.filament for p in every))
-    volume = whole.filament * STRAND
-    mass = volume * settings.solid_density * _GRAMS
+    whole = _whole(prints.values())
+    volume, mass = whole.filament * STRAND, _grams(whole, settings)
     note = _print_words(whole, settings)
     yield BillRow("total", "prints", len(prints), volume=volume, mass=mass, note=note)
 
@@ -262,8 +258,32 @@ def _variant_words(file: str, kerf: float) -> str:
 def _print_words(found: PrintEstimate, settings: Fabrication) -> str:
     """Tells the time and the filament of a print."""
     hours, minutes = divmod(round(found.seconds / 60.0), 60)
-    grams = found.filament * STRAND * settings.solid_density * _GRAMS
+    grams = _grams(found, settings)
     return f"about {hours} h {minutes:02} min, {found.filament / 1000.0:.1f} m or {grams:.0f} g"
+
+
+def _mass_words(
+    mass: float, volume: float, plates: PrintEstimate, settings: Fabrication, infill: float
+) -> str:
+    """Tells what a mass of the units (g) is, and what they weigh if solid and as printed."""
+    solid = volume * settings.solid_density * _GRAMS
+    words = f"{settings.material}; at the density that is simulated"
+    words += ", more than solid" if mass > solid else ""
+    words += f"; {solid:.1f} g if solid"
+    if plates.filament:
+        printed = _grams(plates, settings)
+        words += f", about {printed:.0f} g as printed with walls and {100 * infill:.0f} % infill"
+    return words
+
+
+def _whole(prints: Collection[PrintEstimate]) -> PrintEstimate:
+    """Adds up the estimates of some plates."""
+    return PrintEstimate(sum(p.seconds for p in prints), sum(p.filament for p in prints))
+
+
+def _grams(found: PrintEstimate, settings: Fabrication) -> float:
+    """Computes the mass of a print, g."""
+    return found.filament * STRAND * settings.solid_density * _GRAMS
 
 
 def _counted(count: int, noun: str) -> str:

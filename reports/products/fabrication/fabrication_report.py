@@ -124,7 +124,8 @@ def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[PackageFact]:
     first, last = told["units"][0], told["units"][-1]
     yield PackageFact(units["count"], "units", f"{first} to {last}")
     yield PackageFact(shims["count"], "shims with spares", f"of {kinds} length{'s' * (kinds != 1)}")
-    yield PackageFact(f"{float(units['mass_g']):.0f} g", "mass of the units", units["note"])
+    mass = f"{float(units['mass_g']):.0f} g"
+    yield PackageFact(mass, "mass of the units, simulated", units["note"])
     if thin := told["thin_walls_mm"]:
         note = f"thinnest {min(thin.values()):.2f} mm; the bill of materials names them"
         yield PackageFact(f"{len(thin)}", f"units with walls under {THIN_WALL:g} mm", note)

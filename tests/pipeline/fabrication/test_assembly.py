@@ -143,7 +143,10 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     total = next(row for row in found if row["item"] == "total")
     masses = [float(row["mass_g"]) for row in found if row["item"] == "unit"]
     assert float(total["mass_g"]) == pytest.approx(sum(masses), abs=1e-3)
-    assert "print 62 % full" in total["note"]
+    solid = 1e6 * float(total["volume_mm3"]) * ASKED.solid_density
+    told = f"; at the density that is simulated{', more than solid' * (sum(masses) > solid)}"
+    told += f"; {solid:.1f} g if solid, about 6 g as printed with walls and 62 % infill"
+    assert total["note"] == ASKED.material + told
     plate = next(row for row in found if row["item"] == "plate")
     assert plate["note"] == "2 parts; about 1 h 05 min, 2.0 m or 6 g"
     # 8 rectangles of 32.7 mm, each on two tabs of 0.4 mm; 2 rows and 3 columns, scored 18 times
