@@ -3,6 +3,7 @@
 # `snakemake fig2@edge3` (or fig2_edge3) the same study with a preset. A figure.yaml in place of a
 # problem.yaml shows several studies on one page. See profiles/default.
 import sys
+from functools import partial
 
 from snakemake.utils import min_version
 

@@ -1,6 +1,7 @@
 # Every figure and movie of the paper, and the page over them.
 rule all:
     input:
+        [partial(rule_inputs.shown_datasets, figure) for figure in studies.figures()],
         expand(
             "results/{figure}/report/index.html", figure=["fig1", *studies.figures()]
         ),

@@ -80,6 +80,14 @@ def members(wildcards: Wildcards) -> list[str]:
     return datasets_of(together()[f"{wildcards.name}{wildcards.preset}"])
 
 
+def shown_datasets(built: str, _: Wildcards | None = None) -> list[str]:
+    """Lists the datasets that the page of a target shows: of a study, or of a figure of several."""
+    if built in together():
+        return datasets_of(together()[built])
+    study = [Study.parse(built)]
+    return [*datasets_of(study), *comparisons_of(study)]
+
+
 def product_pages(built: str, product: str) -> list[str]:
     """Lists the pages of a product (`fabrication`, say) of a study, or of all of a figure."""
     names = together().get(built) or [Study.parse(built)]

@@ -8,7 +8,7 @@ import yaml
 from snakemake.iocontainers import Wildcards
 
 from pipeline.workflow.product_checks import check_products
-from pipeline.workflow.rule_inputs import check_room, figure_hash, products
+from pipeline.workflow.rule_inputs import check_room, figure_hash, products, shown_datasets
 from tests.tables import cases, refused, some
 from tests.workflow.conftest import Sandbox
 
@@ -129,6 +129,31 @@ def test_preset_has_its_own_targets_and_folder(sandbox: Sandbox) -> None:
 def test_second_run_has_nothing_to_do(built: Sandbox) -> None:
     os.utime(built.problem)
     assert "Nothing to be done" in built.run("fig2").stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "made"),
+    some(
+        [
+            ("scatter.nc", only("monte_carlo", "monte_carlo_gather", "report")),
+            ("response.nc", only("simulate", "compare", "report")),
+            ("recordings/cloaked/comparison.nc", only("report") | {"compare": 1}),
+        ],
+        1,
+    ),
+)
+def test_a_dataset_that_is_missing_is_made_again_though_its_page_is_there(
+    built: Sandbox, name: str, made: dict[str, int]
+) -> None:
+    (built.root / "results/fig2" / name).unlink()
+    assert built.planned("fig2") == made
+
+
+def test_targets_show_what_their_pages_do() -> None:
+    both = {f"results/fig6_{void}@quick/response.nc" for void in ("heart", "shamrock")}
+    assert both <= set(shown_datasets("fig6@quick"))
+    assert "results/fig3@quick.2/design.nc" in shown_datasets("fig3@quick")
+    assert "results/fig2/recordings/cloaked/comparison.nc" in shown_datasets("fig2")
 
 
 SHOWN = ("simulate", "as_built", "virtual_specimen", "film_render", "track", "compare", "report")
