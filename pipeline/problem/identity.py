@@ -12,6 +12,12 @@ from pipeline.runtime import STAGES
 REPORT = "report"
 """What depends on all of a problem: the pages."""
 
+_SLOTS: dict[str, Any] = {
+    **dict.fromkeys(("minimum_wall", "minimum_gap", "fillet_radius", "slots"), True),
+    "shims": {"thickness"},
+}
+"""Of the fabrication, what slots as they are drawn depend on."""
+
 
 def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = None) -> str:
     """The problem in working units as JSON with sorted keys: equal problems, equal bytes.
@@ -28,7 +34,9 @@ def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = N
         limits.pop("straight_shims")  # as before there was the key
     if "optimiser" in data and not problem.optimiser.as_built:
         data["optimiser"].pop("as_built")  # likewise
-    if "fabrication" not in data and (needed := _fabrication_of_design(problem, limits or {})):
+    if stage == "as_built":
+        data["fabrication"] = _fabrication_of_slots(problem)
+    elif "fabrication" not in data and (needed := _fabrication_of_design(problem, limits or {})):
         data["fabrication"] = needed
     if stage not in ("redesign", REPORT):
         data["optimiser"].pop("geometric")
@@ -76,6 +84,13 @@ def _fabrication_of_design(problem: Problem, limits: Mapping[str, Any]) -> dict[
         made = problem.fabrication
         sizes = made.slots.model_dump(include={"depth_min", "depth_max", "clearance", "tip"})
         needed |= {"slots": sizes, "minimum_wall": made.minimum_wall}
+    return needed
+
+
+def _fabrication_of_slots(problem: Problem) -> dict[str, Any]:
+    """Lists what structures as built depend on, without the tabs, which are to fit to the kerf."""
+    needed = problem.fabrication.model_dump(mode="json", include=_SLOTS)
+    needed["shims"]["tabs"] = None
     return needed
 
 
