@@ -1,5 +1,7 @@
 """Projects designs on the feasible set by the shortest way."""
 
+import logging
+
 import numpy as np
 
 from sim.core import Floats, SimulationError
@@ -19,6 +21,8 @@ PATIENCE = 3
 
 RETREAT_STEPS = 10
 """Number of steps in which a retreat deepens."""
+
+log = logging.getLogger(__name__)
 
 
 def project(
@@ -95,7 +99,7 @@ def _no_loss(design: Floats) -> tuple[float, Floats, Floats]:
 
 
 def feasible_start(problem: CountedProblem, x: Floats, reach: float) -> ConstraintPoint:
-    """Projects as ``project`` does, in many rounds and ever longer steps.
+    """Projects as ``project`` does, in many rounds and ever longer steps, and tells of the move.
 
     Raises:
         InfeasibleStartError: naming the worst constraint.
@@ -103,7 +107,25 @@ def feasible_start(problem: CountedProblem, x: Floats, reach: float) -> Constrai
     for factor in (1, 4, 16):
         place = project(problem, x, factor * reach, rounds=50, patience=50)
         if place is not None:
+            _tell_of_move(problem, place)
             return place
     start = problem.place(np.clip(x, problem.lower, problem.upper))
     worst = int(np.argmin(start.values))
     raise InfeasibleStartError(worst, -float(start.values[worst]))
+
+
+def _tell_of_move(problem: CountedProblem, place: ConstraintPoint) -> None:
+    """Logs how far a start was moved, and which constraint it misses most."""
+    start = problem.start
+    if start is None or start.violation == 0.0:
+        return
+    worst = int(np.argmin(start.values))
+    named = getattr(problem.constrain, "named", lambda number: ("constraint", number))
+    kind, about = named(worst)
+    log.info(
+        "the start misses %s (%s) by %.3g: moved by up to %.3g mm, to where no limit is missed",
+        kind,
+        about,
+        start.violation,
+        np.abs(place.x - start.x).max(),
+    )

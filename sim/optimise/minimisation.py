@@ -32,7 +32,7 @@ def minimise(
         evaluate: loss, gradient (n,) and further numbers of a design; may raise SimulationError, a
             design that is then avoided without learning from it. The start must succeed.
         constraints: values (m,) and Jacobian (m, n) of a design, all in comparable units (mm).
-        x0: (n,) start; it is moved to a feasible design first if it is not one.
+        x0: (n,) start; it is moved to a feasible design first if it is not one, which is logged.
         bounds: lower and upper bounds of the variables.
         options: of the method.
         callback: called with each Evaluation as it is recorded.

@@ -16,7 +16,8 @@ Evaluate = Callable[[Floats], tuple[float, Floats, Floats]]
 Constrain = Callable[[Floats], tuple[Floats, "sp.csr_array | Floats"]]
 """Design (n,) -> values (m,), required to be >= 0, and their Jacobian (m, n), sparse or dense.
 
-It may raise SimulationError, for a design that is then avoided.
+It may raise SimulationError, for a design that is then avoided. Where it has a method `named`, the
+log takes from it the kind of a constraint, by number, and what it is about.
 """
 
 Callback = Callable[["Evaluation"], None]
@@ -118,6 +119,7 @@ class CountedProblem:
     callback: Callback | None = None  # called with each record
     confirm: Evaluate | None = None  # loss without help of earlier evaluations
     evaluations: list[Evaluation] = field(default_factory=list)
+    start: ConstraintPoint | None = None  # within its bounds, before it was made feasible
     best: EvaluatedPoint | None = None
     steepest: float | None = None  # entry of the first gradient, scale of residuals
 
@@ -143,7 +145,9 @@ class CountedProblem:
         if self.constrain is None:
             return ConstraintPoint(x, np.zeros(0), sp.csr_array((0, len(x))))
         values, jacobian = self.constrain(x)
-        return ConstraintPoint(x, np.asarray(values, dtype=float), sp.csr_array(jacobian))
+        found = ConstraintPoint(x, np.asarray(values, dtype=float), sp.csr_array(jacobian))
+        self.start = self.start or found
+        return found
 
     def simulate(self, place: ConstraintPoint) -> EvaluatedPoint | SimulationError:
         """Evaluates the loss; a failure is returned, for the method to step back from.

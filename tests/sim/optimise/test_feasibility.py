@@ -1,8 +1,13 @@
+import logging
+import re
+
 import numpy as np
 import pytest
 
+import sim
 from sim.core import Floats
 from sim.optimise import InfeasibleStartError, feasible_design, minimise
+from tests.sim.structures import pressed
 
 
 def test_a_projection_that_leads_nowhere_is_given_up() -> None:
@@ -35,3 +40,17 @@ def test_a_start_is_told_where_its_bounds_put_it() -> None:
 
     with pytest.raises(InfeasibleStartError, match="constraint 0 by 4"):
         minimise("sqp", loss, constrain, np.array([6.0]), (0.0, 1.0))
+
+
+@pytest.mark.parametrize(("void_angle", "moved"), [(0.5, False), (0.9, True)])
+def test_how_far_a_start_is_moved_is_logged(
+    void_angle: float, moved: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    limits, options = sim.Limits(void_angle=void_angle), sim.SqpOptions(evaluations=1, retreats=0)
+    with caplog.at_level(logging.INFO, logger="sim.optimise"):
+        sim.minimise(pressed(1.0, steps=1), limits, options=options)
+    found = [line for line in caplog.messages if line.startswith("the start misses void_angle (")]
+    assert len(found) == moved
+    assert all(
+        re.search(r"unit \[1, 0\]\) by 0.137: moved by up to 0.3\d* mm", line) for line in found
+    )
