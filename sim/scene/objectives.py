@@ -65,9 +65,10 @@ class ReactionMimicking(NamedTuple):
 
     motion: RelativeMimicking  # error of the motion
     weight: float  # of the force's error in the sum
-    ligaments: Ints  # (n,) that join a driven unit to one that is not
+    ligaments: Ints  # (n,) that join a driven unit to one that is not, in any case
     ligament_units: Ints  # (n, 2) units that they join
-    sign: Ints  # (n,) 1 where the first of both is driven, else -1
+    # (n_cases, n) 1 where the case drives the first of both alone, -1 the second alone, else 0
+    sign: Ints
     target: Numbers  # (n_cases, n_times, 2) force to mimic, N
     size: Numbers  # (n_cases,) what counts as 1, N
 
@@ -79,6 +80,15 @@ class ReactionMimicking(NamedTuple):
 
     def force(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Force (n_cases, n_times, 2) of the drive in states (n_cases, n_times, n_units, 3), N."""
+        return jnp.einsum("ctld,cl->ctd", self._pulls(displacement, parameters), self.sign)
+
+    def carried(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
+        """Sum (n_cases, n_times) of the magnitudes of the ligaments' forces in states, N."""
+        each = jnp.linalg.norm(self._pulls(displacement, parameters), axis=3)
+        return jnp.einsum("ctl,cl->ct", each, np.abs(self.sign))
+
+    def _pulls(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
+        """Forces (n_cases, n_times, n, 2) at the first ends of the ligaments, N."""
         ends = jnp.asarray(displacement)[..., self.ligament_units, :]
         arm, vector = parameters.arm[self.ligaments], parameters.vector[self.ligaments]
         law, natural = LigamentLaw(*parameters.law[self.ligaments].T), parameters.natural
@@ -86,8 +96,7 @@ class ReactionMimicking(NamedTuple):
         pulls = _end_forces(
             flat[:, :, 0], flat[:, :, 1], arm[:, 0], arm[:, 1], vector, law, natural[self.ligaments]
         )
-        total = jnp.einsum("sld,l->sd", pulls[..., :2], self.sign)
-        return total.reshape(*ends.shape[:2], 2)
+        return pulls[..., :2].reshape(*ends.shape[:3], 2)
 
 
 def combined(losses: Numbers, weights: Numbers, sharpness: float) -> Array:

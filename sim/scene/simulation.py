@@ -26,12 +26,14 @@ from sim.scene.objectives import (
 from sim.scene.parameter_map import concrete_parameters, parameters_of_design
 from sim.scene.plan import Plan, make_plan, sample_times
 from sim.scene.scene import Scene
-from sim.scene.soundness import check_cases, check_units
+from sim.scene.soundness import SceneError, check_cases, check_units
 from sim.solvers import Case, Solver, concrete, differentiable_motion, solve_cases
 from sim.structure import Parameters
 from sim.time_integration import simpson_weights
 
 Mimicking = DisplacementMimicking | RelativeMimicking | ReactionMimicking | StrainEnergyMimicking
+BALANCED = 1e-9
+"""Net force of a drive over the sum of its ligaments' forces, below which it is rounding."""
 
 
 @dataclass(frozen=True)
@@ -213,6 +215,7 @@ def mimicking(
 
     Raises:
         ValueError: the scene has no region of interest.
+        SceneError: the force of a drive is to be mimicked, and vanishes.
     """
     lattice, asked = scene.lattice, scene.objective
     given = _weights(scene) if weights is None else weights
@@ -231,22 +234,39 @@ def mimicking(
 
 
 def _with_reaction(scene: Scene, motion: RelativeMimicking) -> ReactionMimicking:
-    """Adds the force of the drive to a motion to mimic; simulates the reference for it."""
+    """Adds the force of the drive to a motion to mimic; simulates the reference for it.
+
+    Raises:
+        SceneError: the forces of a drive balance in the reference, so it has none to mimic.
+    """
     intact, asked = scene.objective.reference, scene.objective
     assert intact is not None
     of_intact = ReactionMimicking(motion, 1.0, *_cut(intact), np.zeros(2), np.ones(1))
     moved = simulate(intact, vertices=intact.lattice.vertices)
     target = np.asarray(of_intact.force(moved.displacement, moved.parameters))
+    carried = np.asarray(of_intact.carried(moved.displacement, moved.parameters))
     size = np.linalg.norm(target, axis=2)
-    whole = size.max(axis=1) if asked.steps is None else size[:, -1] / np.sqrt(asked.steps)
+    net, every = (
+        each.max(axis=1) if asked.steps is None else each[:, -1] for each in (size, carried)
+    )
+    for case in np.flatnonzero(~(net > BALANCED * every)):
+        raise SceneError(
+            f"the forces of load case {case} on the units that it drives balance in the reference"
+            f" ({net[case]:.2g} N of {every[case]:.2g} N), so there is none to mimic; leave the"
+            " reaction out, or drive one side",
+            "objective.reaction",
+        )
+    whole = net if asked.steps is None else net / np.sqrt(asked.steps)
     return ReactionMimicking(motion, asked.reaction, *_cut(scene), target, whole)
 
 
 def _cut(scene: Scene) -> tuple[Ints, Ints, Ints]:
-    """Finds the ligaments between driven units and others, their units, and signs by the order."""
-    driven = np.isin(scene.lattice.ligament_units, scene.loads.driven)
-    cut = np.flatnonzero(driven[:, 0] != driven[:, 1])
-    return cut, scene.lattice.ligament_units[cut], np.where(driven[cut, 0], 1, -1)
+    """Finds the ligaments that any case cuts off its driven units, their units, and signs."""
+    ends = scene.lattice.ligament_units
+    driven = np.array([np.isin(ends, case.units) for case in scene.loads.cases]).astype(np.int64)
+    sign = driven[..., 0] - driven[..., 1]
+    cut = np.flatnonzero(sign.any(axis=0))
+    return cut, ends[cut], sign[:, cut]
 
 
 def _weights(scene: Scene) -> Floats:

@@ -7,6 +7,8 @@ from sim.energy.ligament_kernels import gradient
 from sim.scene import (
     DisplacementMimicking,
     Evaluator,
+    Scene,
+    SceneError,
     StrainEnergyMimicking,
     make_plan,
     mimicking,
@@ -14,11 +16,11 @@ from sim.scene import (
     strain_energies,
 )
 from sim.scene.objectives import RelativeMimicking, extent
-from sim.solvers import Harmonic
+from sim.solvers import Harmonic, LinearRamp, PrescribedMotion, Together
 from sim.time_integration import simpson_weights
 from tests.sim.load_family.test_load_family import mimicked
 from tests.sim.scene.test_plan import design_of
-from tests.sim.structures import Rig, rotating_squares, some_ligaments, taylor_orders
+from tests.sim.structures import LEFT, Rig, pressed, rotating_squares, some_ligaments, taylor_orders
 
 RIG = Rig(rotating_squares(), np.array([0, 4]), np.array([12]), Harmonic(1.0, 2.0))
 MOTION = np.random.default_rng(2).normal(size=(2, 5, 25, 3)) * [1.0, 1.0, 0.1]
@@ -88,3 +90,31 @@ def test_the_force_of_the_cut_ligaments_is_that_of_the_drive() -> None:
         lambda step: evaluate(design + step * way)[0], gradient @ way, np.array([2e-3, 1e-3])
     )
     np.testing.assert_allclose(ahead, 2.0, atol=0.07)
+
+
+def squeezed_between(*cases: PrescribedMotion) -> Scene:
+    """Nothing is clamped; the force of the undesigned structure is mimicked."""
+    made = pressed(1.0, cases=cases, supports=())
+    return made.updated(reference=made, reaction=1.0)
+
+
+def test_the_force_is_that_of_the_units_which_a_case_drives() -> None:
+    """The others that it holds for another case carry the opposite force."""
+    sides = ((LEFT, LinearRamp(1.0, 1.0)), (LEFT + 4, LinearRamp(-1.0, 1.0)))
+    scene = squeezed_between(*(PrescribedMotion(*side) for side in sides))
+    measure, response = mimicking(scene), simulate(scene)
+    force = measure.force(response.displacement, response.parameters)  # type: ignore[union-attr]
+    for case, (units, _) in enumerate(sides):
+        wanted = response.observables[case].force_on(units)
+        np.testing.assert_allclose(force[case], wanted, rtol=1e-9, atol=1e-9)
+        assert abs(wanted[-1, 0]) > 0.1
+    np.testing.assert_allclose(response.losses, 0.0, atol=1e-9)
+
+
+def test_a_drive_whose_forces_balance_has_none_to_mimic() -> None:
+    ways = (LinearRamp(1.0, 1.0), LinearRamp(-1.0, 1.0))
+    both = Together(ways, np.repeat(np.eye(2), 5, axis=0))
+    scene = squeezed_between(PrescribedMotion(np.concatenate([LEFT, LEFT + 4]), both))
+    with pytest.raises(SceneError, match=r"load case 0 .* balance .* leave the reac") as refusal:
+        mimicking(scene)
+    assert refusal.value.key == "objective.reaction"
