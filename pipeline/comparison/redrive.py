@@ -64,7 +64,7 @@ class RedrivenMotion(NamedTuple):
     # (n_times, n_units, 3) of the units of the scene's lattice; NaN beyond the end of a path that
     # ended early
     displacement: Floats
-    drive_force: Floats  # (n_times, 2) force of the drive on all driven units, N
+    drive_force: Floats  # (n_times, 2) force of the drive on all its units, N
     failure: str | None = None  # why the path ended early
 
 
@@ -151,7 +151,6 @@ def simulate_redriven(structure: PosedStructure, held: HeldMotion, times: Floats
         values = concrete_parameters(driven, vertices)
         seen = observe(driven.topology, values, found)
         displacement[: len(found)] = found
-        force[: len(found)] = drive_force(
-            driven, values, seen, driven.loads.cases[0], times[: len(found)], scene.loads.driven
-        )
+        drive, leading = driven.loads.cases[0], scene.loads.cases[0].leading
+        force[: len(found)] = drive_force(driven, values, seen, drive, times[: len(found)], leading)
     return RedrivenMotion(displacement, force, failure)

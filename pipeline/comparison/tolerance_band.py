@@ -31,7 +31,7 @@ class Specimens(NamedTuple):
     """Holds specimens that were simulated."""
 
     displacement: Floats  # (n_samples, n_times, n_units, 3) of the units of the structure's lattice
-    drive_force: Floats  # (n_samples, n_times, 2) force of the drive on all driven units, N
+    drive_force: Floats  # (n_samples, n_times, 2) force of the drive on all its units, N
     failures: tuple[str, ...]  # of each specimen drawn that has no simulation, why
 
 
@@ -61,9 +61,9 @@ def sample_specimens(
     cases = (
         case for each, copy in made if copy.sound for case in cases_of(each, copy.vertices, solver)
     )
-    courses = []
+    courses, leading = [], planned.loads.cases[case].leading
     with cli.progress(len(made), "specimens", initial=len(failures)) as bar:
-        for outcome in run_batch(cases, _measure(scene, planned.loads.driven), threads):
+        for outcome in run_batch(cases, _measure(scene, leading), threads):
             if outcome.value is None:
                 failures.append(outcome.failure or "")
             else:
@@ -87,12 +87,12 @@ def _solver(scene: Scene, vertices: Floats, times: Floats) -> Solver:
     return replace(solver, start=response.records[0])
 
 
-def _measure(scene: Scene, driven: Ints) -> Measure[tuple[Floats, Floats]]:
+def _measure(scene: Scene, leading: Ints) -> Measure[tuple[Floats, Floats]]:
     def reduce(solved: Solved) -> tuple[Floats, Floats]:
         case, motion = solved.case, solved.displacement
         seen = observe(scene.topology, case.values, motion)
         times = case.solver.output_times
-        return motion, drive_force(scene, case.values, seen, case.drive, times, driven)
+        return motion, drive_force(scene, case.values, seen, case.drive, times, leading)
 
     return reduce
 

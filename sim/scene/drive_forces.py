@@ -17,7 +17,7 @@ def drive_force(
     times: Floats,
     units: Ints | None = None,
 ) -> Floats:
-    """Sums the forces (n_times, 2) on the driven units: held in place, and put on, N.
+    """Sums the forces (n_times, 2) on the units of a drive: held in place, and put on, N.
 
     In time they accelerate these units and overcome their damping as well. At kinks of the motion,
     such as a start with a velocity, the impulses are left out.
@@ -28,9 +28,10 @@ def drive_force(
         seen: what was observed of the states.
         drive: the drive of their load case.
         times: (n_times,) of the states, s; load parameters of a static scene.
-        units: (n,) the units meant; by default all that the scene drives.
+        units: (n,) the units meant; by default the drive's, of several motions together the first
+            one's: those of a squeeze balance.
     """
-    meant = scene.loads.driven if units is None else units
+    meant = drive.leading if units is None else units
     put_on = drive.forces(times)
     if not scene.loads.static:
         put_on = put_on + drive.resistance(values, times)

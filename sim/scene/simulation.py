@@ -72,7 +72,10 @@ class Response:
 
     @cached_property
     def drive_force(self) -> Floats:
-        """(n_cases, n_times, 2) force on the driven units, N; in time with their inertia."""
+        """(n_cases, n_times, 2) force on the units of each drive, N; in time with their inertia.
+
+        Of motions that act together it is that on the first one's units.
+        """
         drives = [self.scene.loads.cases[case] for case in self.cases]
         return np.stack(
             [

@@ -10,7 +10,14 @@ from jax import Array
 
 from sim.core import Floats, Ints, Numbers
 from sim.energy import Topology
-from sim.solvers.loads import DISPLACEMENT, FORCE, MotionLaw, held_values, loaded_units
+from sim.solvers.loads import (
+    DISPLACEMENT,
+    FORCE,
+    MotionLaw,
+    Together,
+    held_values,
+    loaded_units,
+)
 from sim.structure import ConcreteParameters
 
 
@@ -32,6 +39,13 @@ class PrescribedMotion(NamedTuple):
     def loaded(self) -> Ints:
         """(n_loaded,) units under a force, ascending."""
         return self.units[:0] if self.control is None else loaded_units(self.units, self.control)
+
+    @property
+    def leading(self) -> Ints:
+        """(n_leading,) units whose force is the drive's: of motions together the first one's."""
+        if not isinstance(self.motion, Together):
+            return self.units
+        return self.units[np.asarray(self.motion.shares)[:, 0] != 0.0]
 
     def forces(self, times: Floats) -> Floats:
         """Forces (n_times, n, 3) that it puts on its units, N and N mm; zero where it puts none."""

@@ -9,7 +9,7 @@ from pipeline.comparison.redrive import filter_held_motion, fit_spline, simulate
 from pipeline.posing import PosedStructure, scene_of
 from pipeline.runtime import UserError
 from sim.scene import Scene, concrete_parameters, make_plan
-from sim.solvers import solve_case
+from sim.solvers import LinearRamp, PrescribedMotion, Together, solve_case
 from tests.pipeline import static
 
 SIGMA = np.array([0.004, 0.004, 0.0006])
@@ -59,6 +59,19 @@ def test_motions_along_a_path_and_in_time_are_found_again(pressed: Scene) -> Non
     made = simulate_redriven(structure, filter_held_motion(track, scene), track["time"].values)
     share = np.sqrt(np.mean((made.displacement - motion) ** 2) / np.mean(motion**2))
     assert share < 0.02
+
+
+def test_the_force_of_two_sides_that_were_pressed_is_the_first_ones(pressed: Scene) -> None:
+    right = pressed.loads.driven
+    left = np.unique(pressed.loads.clamped // 3)
+    ways = LinearRamp(2.0, 1.0, np.pi), LinearRamp(2.0, 1.0)
+    both = Together(ways, np.repeat(np.eye(2), 5, axis=0))
+    drive = PrescribedMotion(np.concatenate([right, left]), both)
+    scene = pressed.updated(cases=(drive,), supports=(), reference=None)
+    track, _ = tracked(scene, 1.0, 12)
+    structure = PosedStructure(scene, scene.lattice.vertices)
+    made = simulate_redriven(structure, filter_held_motion(track, scene), track["time"].values)
+    assert (made.drive_force[4:, 0] < -0.1).all()
 
 
 def test_frames_that_show_nothing_are_bridged(pressed: Scene) -> None:

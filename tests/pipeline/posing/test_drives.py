@@ -59,6 +59,7 @@ def test_a_force_is_shared_by_units_and_a_moment_turns_one(tmp_path: Path) -> No
 def test_several_drives_act_at_once_in_all_directions(tmp_path: Path) -> None:
     scene = posed(tmp_path, f"drives:\n  - {PUSH}\n  - {TURN}")
     np.testing.assert_array_equal(scene.loads.driven, [2, *RIGHT])
+    np.testing.assert_array_equal(scene.loads.cases[0].leading, RIGHT)
     end = moved(scene)[-1]
     np.testing.assert_allclose(end[2], [0.0, 0.0, np.deg2rad(10.0)])
     alone = moved(posed(tmp_path, f"drive: {TURN}"))[-1]

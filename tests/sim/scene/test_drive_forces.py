@@ -7,7 +7,9 @@ import numpy as np
 import sim
 from sim.energy import observe
 from sim.scene import drive_force
+from sim.solvers import Together
 from tests.sim.scene.test_plan import scene as seven_by_seven
+from tests.sim.structures import LEFT, pressed
 
 FREQUENCY = 100.0
 TIMES = np.linspace(0.0, 0.1, 2001)
@@ -49,3 +51,20 @@ def test_units_that_are_not_meant_add_nothing() -> None:
         drive_force(still, *told[1:], response.times),
         elastic.force_on(scene.loads.driven),
     )
+
+
+def test_each_case_has_the_force_of_its_own_units() -> None:
+    """Of two sides pressed at once it is that of the first, the other's being opposite."""
+    right = LEFT + 4
+    ways = sim.LinearRamp(1.0, 1.0), sim.LinearRamp(-1.0, 1.0)
+    both = Together(ways, np.repeat(np.eye(2), 5, axis=0))
+    alone = (sim.PrescribedMotion(*side) for side in zip((LEFT, right), ways, strict=True))
+    for cases, units in (
+        (tuple(alone), (LEFT, right)),
+        ((sim.PrescribedMotion(np.concatenate([LEFT, right]), both),), (LEFT,)),
+    ):
+        response = sim.simulate(pressed(1.0, cases=cases, supports=()))
+        for case, own in enumerate(units):
+            force = response.observables[case].force_on(own)
+            assert abs(force[-1, 0]) > 0.1
+            np.testing.assert_array_equal(response.drive_force[case], force)
