@@ -264,9 +264,9 @@ def _with_reaction(scene: Scene, motion: RelativeMimicking) -> ReactionMimicking
 
 
 def _cut(scene: Scene) -> tuple[Ints, Ints, Ints]:
-    """Finds the ligaments that any case cuts off its driven units, their units, and signs."""
+    """Finds the ligaments that any drive's units are cut off by, their units, and signs."""
     ends = scene.lattice.ligament_units
-    driven = np.array([np.isin(ends, case.units) for case in scene.loads.cases]).astype(np.int64)
+    driven = np.array([np.isin(ends, case.leading) for case in scene.loads.cases]).astype(np.int64)
     sign = driven[..., 0] - driven[..., 1]
     cut = np.flatnonzero(sign.any(axis=0))
     return cut, ends[cut], sign[:, cut]

@@ -16,7 +16,7 @@ from sim.scene import (
     strain_energies,
 )
 from sim.scene.objectives import RelativeMimicking, extent
-from sim.solvers import Harmonic, LinearRamp, PrescribedMotion, Together
+from sim.solvers import Harmonic, LinearRamp, PrescribedMotion, TimeSeries, Together
 from sim.time_integration import simpson_weights
 from tests.sim.load_family.test_load_family import mimicked
 from tests.sim.scene.test_plan import design_of
@@ -25,6 +25,7 @@ from tests.sim.structures import LEFT, Rig, pressed, rotating_squares, some_liga
 RIG = Rig(rotating_squares(), np.array([0, 4]), np.array([12]), Harmonic(1.0, 2.0))
 MOTION = np.random.default_rng(2).normal(size=(2, 5, 25, 3)) * [1.0, 1.0, 0.1]
 WEIGHTS = simpson_weights(5, 1.0)
+SIDES = np.concatenate([LEFT, LEFT + 4])
 
 
 def test_displacement_mimicking_is_the_papers_sum() -> None:
@@ -98,23 +99,26 @@ def squeezed_between(*cases: PrescribedMotion) -> Scene:
     return made.updated(reference=made, reaction=1.0)
 
 
-def test_the_force_is_that_of_the_units_which_a_case_drives() -> None:
-    """The others that it holds for another case carry the opposite force."""
-    sides = ((LEFT, LinearRamp(1.0, 1.0)), (LEFT + 4, LinearRamp(-1.0, 1.0)))
-    scene = squeezed_between(*(PrescribedMotion(*side) for side in sides))
-    measure, response = mimicking(scene), simulate(scene)
-    force = measure.force(response.displacement, response.parameters)  # type: ignore[union-attr]
-    for case, (units, _) in enumerate(sides):
-        wanted = response.observables[case].force_on(units)
-        np.testing.assert_allclose(force[case], wanted, rtol=1e-9, atol=1e-9)
-        assert abs(wanted[-1, 0]) > 0.1
-    np.testing.assert_allclose(response.losses, 0.0, atol=1e-9)
+def test_the_force_is_that_of_the_units_of_each_drive() -> None:
+    """The other side, held for another case or driven as well, carries the opposite force."""
+    ways = LinearRamp(1.0, 1.0), LinearRamp(-1.0, 1.0)
+    left, right = map(PrescribedMotion, (LEFT, LEFT + 4), ways)
+    both = PrescribedMotion(SIDES, Together(ways, np.repeat(np.eye(2), 5, axis=0)))
+    for cases, sides in (((left, right), (LEFT, LEFT + 4)), ((both,), (LEFT,))):
+        scene = squeezed_between(*cases)
+        measure, response = mimicking(scene), simulate(scene)
+        force = measure.force(response.displacement, response.parameters)  # type: ignore[union-attr]
+        for case, units in enumerate(sides):
+            wanted = response.observables[case].force_on(units)
+            np.testing.assert_allclose(force[case], wanted, rtol=1e-9, atol=1e-9)
+            assert abs(wanted[-1, 0]) > 0.1
+        np.testing.assert_allclose(response.losses, 0.0, atol=1e-9)
 
 
 def test_a_drive_whose_forces_balance_has_none_to_mimic() -> None:
-    ways = (LinearRamp(1.0, 1.0), LinearRamp(-1.0, 1.0))
-    both = Together(ways, np.repeat(np.eye(2), 5, axis=0))
-    scene = squeezed_between(PrescribedMotion(np.concatenate([LEFT, LEFT + 4]), both))
+    ends = np.zeros((2, 10, 3))
+    ends[1, :, 0] = np.repeat([1.0, -1.0], 5)
+    scene = squeezed_between(PrescribedMotion(SIDES, TimeSeries(np.array([0.0, 1.0]), ends)))
     with pytest.raises(SceneError, match=r"load case 0 .* balance .* leave the reac") as refusal:
         mimicking(scene)
     assert refusal.value.key == "objective.reaction"
