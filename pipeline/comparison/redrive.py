@@ -6,6 +6,7 @@ residuals over sigma is the number of frames. Its knots gather where the motion 
 at the start of a drive. Frames in which a unit was not seen are bridged by it.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -121,8 +122,15 @@ def fit_spline(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
 
 
 def drive_as_measured(scene: Scene, held: HeldMotion) -> Scene:
-    """The scene with all held units driven as measured; its end is that of the measurement."""
+    """The scene with all held units driven as measured; its end is that of the measurement.
+
+    What clamps them is left out, in place of which their measured motion stands.
+    """
     return scene.updated(
+        supports=tuple(
+            replace(each, units=np.setdiff1d(each.units, held.unit))
+            for each in scene.loads.supports
+        ),
         cases=(PrescribedMotion(held.unit, held.motion),),
         weights=None,
         duration=held.motion.step * (len(held.motion.value) - 1),

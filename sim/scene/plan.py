@@ -82,7 +82,7 @@ def make_plan(
             a path goes on where units meet.
 
     Raises:
-        SimulationError: nothing can move, or nothing acts on what does.
+        SimulationError: nothing can move, or no two units are joined.
         SceneError: the scene has no meaning.
     """
     structure = scene.lattice.vertices if vertices is None else vertices

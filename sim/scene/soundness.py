@@ -12,7 +12,7 @@ import shapely
 from sim.core import Floats, Ints, SimulationError
 from sim.scene.expected_cost import count_unknowns, estimate_cost
 from sim.scene.scene import DOFS, Scene, displaced
-from sim.solvers import DISPLACEMENT, PrescribedMotion, TimeSeries, single_motions
+from sim.solvers import DISPLACEMENT, FREE, PrescribedMotion, TimeSeries, single_motions
 from sim.structure import Lattice, polygons
 
 LOG = logging.getLogger(__name__)
@@ -23,6 +23,8 @@ ROUNDING = 1e-5
 """Over the spacing, by which a ligament may differ between given vertices and the lattice."""
 JUMP, SOME_JUMP = 0.05, 0.01
 """Of a motion at its start, over its largest displacement: refused, and warned of."""
+ACROSS = 1e-9
+"""Part of a motion, over its largest, up to which it is across a direction but for rounding."""
 INSTANTS = 513
 """At which a motion is looked at."""
 LARGE = 100_000
@@ -182,6 +184,7 @@ def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iter
     instants = np.linspace(0.0, end, INSTANTS)
     with jax.ensure_compile_time_eval():  # under jax.jit, which is refused further on
         course = np.asarray(drive.motion(instants)).reshape(INSTANTS, -1, 3)
+    _clamped(scene, drive, course, case)
     if drive.control is not None:
         course = np.where(drive.control == DISPLACEMENT, course, 0.0)
     far = float(np.hypot(course[..., 0], course[..., 1]).max(initial=0.0))
@@ -206,6 +209,22 @@ def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iter
         raise SceneError(f"{said}; let it start from rest", "drive")
     if jump > SOME_JUMP:
         yield said
+
+
+def _clamped(scene: Scene, drive: PrescribedMotion, course: Floats, case: str) -> None:
+    """Refuses motions and forces, in the course (n_times, n_driven, 3), of what is clamped."""
+    size = np.abs(course).max(axis=0)
+    acts = np.broadcast_to(size > ACROSS * size.max(initial=0.0), (len(drive.units), 3))
+    if drive.control is not None:
+        acts = acts & (drive.control != FREE)
+    dofs = (3 * drive.units[:, None] + np.arange(3))[acts]
+    if len(both := np.intersect1d(dofs, scene.loads.clamped)) > 0:
+        unit, dof = divmod(int(both[0]), 3)
+        raise SceneError(
+            f"unit {unit} is driven by {case} and clamped, along {DOFS[dof]}; drive or clamp it,"
+            " not both",
+            "drive.units",
+        )
 
 
 def _series(motion: TimeSeries, case: str, end: float) -> None:

@@ -48,7 +48,7 @@ def check_parameters(values: ConcreteParameters, motion: MotionLaw) -> None:
 
 
 def check_free_dofs(topology: Topology) -> None:
-    """Raises an error if nothing can move, or nothing acts on what does."""
+    """Raises an error if nothing can move, or no two units are joined."""
     if topology.n_free == 0:
         raise SimulationError(
             "every unit is held, so nothing is left to solve for; hold fewer units"

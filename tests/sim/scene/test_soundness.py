@@ -8,7 +8,7 @@ import sim
 from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
 from sim.scene import SceneError, check_scene
-from sim.solvers import MotionLaw, solve_case
+from sim.solvers import FORCE, FREE, MotionLaw, solve_case
 from tests.sim.structures import LEFT, Rig, hand_made, pressed, rotating_squares, squeezed
 
 
@@ -29,6 +29,8 @@ def crossed(unit: int) -> Floats:
 
 
 UNKNOWN: Any = ("uz",)
+PULLED = sim.LinearRamp(1.0, 1.0, 0.3)
+FORCES = np.full((5, 3), FORCE)
 MOVING = {"static": False, "frequency": 10.0, "steps": None, "samples": 3}
 REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
     "beyond": (scene(sim.LinearRamp(-400.0, 1.0)), "400 mm, further than", "drive.amplitude"),
@@ -59,6 +61,14 @@ REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
     "kept": (scene(frozen=np.array([25])), "no unit 25", "cloak"),
     "a list": (scene(region=[12]), "no array of integers", "objective.region"),
     "a float": (scene(region=np.array([12.0])), "no array of integers", "objective.region"),
+    "clamped": (
+        scene(supports=(sim.Clamp(LEFT), sim.Clamp(LEFT + 4, ("ux",)))),
+        "unit 4 is driven by load case 0 and clamped, along ux; drive or clamp", "drive.units",
+    ),
+    "clamped and loaded": (
+        scene(cases=(sim.PrescribedMotion(LEFT, sim.LinearRamp(-1.0, 1.0), FORCES),)),
+        "unit 0 is driven by .* along ux", "drive.units",
+    ),
     "no such dof": (scene(supports=(sim.Clamp(LEFT, UNKNOWN),)), "no 'uz'; .*ux, uy", "supports"),
 }  # fmt: skip
 
@@ -83,6 +93,14 @@ def test_sound_scenes_pass() -> None:
         scene(supports=(sim.Clamp(LEFT, ("ux",)),)),
         scene(series(start=1.0)),  # a path begins where its first load is
         scene(series(), **MOVING),
+        scene(  # along a rail
+            sim.LinearRamp(1.0, 1.0, np.pi),
+            supports=(sim.Clamp(LEFT), sim.Clamp(LEFT + 4, ("uy", "theta"))),
+        ),
+        scene(
+            supports=(sim.Clamp(LEFT), sim.Clamp(LEFT + 4, ("uy",))),
+            cases=(sim.PrescribedMotion(LEFT + 4, PULLED, np.array([[0, FREE, 0]] * 5)),),
+        ),
         scene(sim.Harmonic(3.0, 10.0), supports=(), **MOVING),
         scene(  # each case holds what the other one moves
             cases=tuple(
