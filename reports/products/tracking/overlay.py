@@ -22,7 +22,8 @@ _OPACITY = 0.8
 _BAND = 46  # px below the picture
 _LARGE = 1000  # px: smaller pictures are doubled, so that ids can be read
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
-_INK = (26, 26, 26)
+_INK, _PAPER = (26, 26, 26), (255, 255, 255)
+_LIGHT = 0.57  # lightness of OKLab on which both are told as well
 _LOST = tuple(round(255 * part) for part in to_rgb(style.ALTERED))
 
 
@@ -144,8 +145,16 @@ def _ids(painted: Painter, image: Image, places: NDArray[np.int32]) -> None:
         text = str(number)
         (wide, high), _ = cv2.getTextSize(text, _FONT, height, 1)
         at = (int(x - wide / 2), int(y + high / 2))
-        cv2.putText(image, text, at, _FONT, height, (255, 255, 255), 3, cv2.LINE_AA)
-        cv2.putText(image, text, at, _FONT, height, _INK, 1, cv2.LINE_AA)
+        ink, rim = _inks(image[max(y - high, 0) : y + high, max(x - wide, 0) : x + wide])
+        cv2.putText(image, text, at, _FONT, height, rim, 3, cv2.LINE_AA)
+        cv2.putText(image, text, at, _FONT, height, ink, 1, cv2.LINE_AA)
+
+
+def _inks(under: Image) -> tuple[tuple[int, int, int], tuple[int, int, int]]:
+    """Returns the colours of letters and of their rims on what is light, or dark."""
+    if not under.size or style.oklab(under.mean(axis=(0, 1)) / 255)[0] > _LIGHT:
+        return _INK, _PAPER
+    return _PAPER, _INK
 
 
 def _legend(painted: Painter) -> Image:

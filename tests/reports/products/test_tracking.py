@@ -158,6 +158,18 @@ def test_units_are_coloured_and_lost_ones_hatched(track: xr.Dataset) -> None:
     assert (drawn[-1][_about(2 * lost)] != drawn[0][_about(2 * lost)]).any()
 
 
+def test_ids_are_light_on_dark_units_and_dark_on_light_ones(track: xr.Dataset) -> None:
+    painted = overlay.painter(track, "displacement")
+    place = painted.camera.project(painted.specimen.centre[12] + painted.pose[0, 12, :2])
+    light, dark = (
+        next(overlay.images(shown, [Frame(0, 0.0, grey())]))[_about(2 * place + 0.5)].mean(axis=-1)
+        for shown in (painted, painted._replace(values=np.full_like(painted.values, 1e3)))
+    )
+    strokes = light < 60
+    assert strokes.sum() > 10
+    assert np.median(dark[strokes]) > 200
+
+
 def test_a_frame_is_called_by_its_number_in_the_file(track: xr.Dataset) -> None:
     painted = overlay.painter(track, "displacement")
     first, later = (
