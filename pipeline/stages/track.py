@@ -42,6 +42,7 @@ from pipeline.tracking.motion import (
     Patch,
     Track,
     follow_patch,
+    median_uncertainty,
     moved_outline,
     square,
     track_video,
@@ -298,14 +299,15 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
     if has_uneven_intervals(track.time):
         LOG.warning("the frame rate varies; times are the file's own stamps")
     lost = float(np.mean(track.quality != 0))
+    place, turn = median_uncertainty(track.sigma)
     LOG.info(
-        "%d frames, %d units; %.2f %% not seen; median uncertainty %.4f mm, %.3f deg;"
-        " %d timing faults",
+        "%d frames, %d units; %.2f %% not seen; median uncertainty %.4f mm (root mean square of x"
+        " and y), %.3f deg; %d timing faults",
         len(track.time),
         track.quality.shape[1],
         100 * lost,
-        np.nanmedian(track.sigma[..., :2]),
-        np.rad2deg(np.nanmedian(track.sigma[..., 2])),
+        place,
+        np.rad2deg(turn),
         np.count_nonzero(track.timing),
     )
     return track

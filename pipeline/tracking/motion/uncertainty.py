@@ -45,6 +45,15 @@ def standard_errors(scatter: Floats, blocks: Floats) -> Floats:
     return np.sqrt(variance)
 
 
+def median_uncertainty(sigma: Reals) -> tuple[float, float]:
+    """Returns medians of uncertainties (frames, units, 3): of a coordinate and of the rotation.
+
+    That of a coordinate is the root mean square of the medians of x and y.
+    """
+    x, y, turn = np.nanmedian(sigma.astype(float), axis=(0, 1))
+    return float(np.hypot(x, y) / np.sqrt(2)), float(turn)
+
+
 def residual_likeness(fits: PoseFits) -> float:
     """Returns the variance that blocks of residuals tell, over that of white ones: one or more."""
     white = np.einsum("uii->ui", fits.curvature)[:, :3] * fits.noise[:, None] ** 2

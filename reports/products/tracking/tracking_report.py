@@ -111,4 +111,7 @@ def _lines(track: xr.Dataset, found: TrackQuality) -> Iterator[tuple[str, str, s
 
 def _accuracy(of: np.ndarray, pixel: float) -> tuple[str, str]:
     place = float(np.hypot(*of[:2]) / np.sqrt(2))
-    return f"{place:.3f} px, {of[2]:.3f} deg", f"{1000 * place * pixel:.2g} µm"
+    return (
+        f"{place:.3f} px, {of[2]:.3f} deg",
+        f"{1000 * place * pixel:.2g} µm, root mean square of x and y",
+    )

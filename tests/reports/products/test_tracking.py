@@ -10,6 +10,7 @@ import xarray as xr
 from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.tracking.frames import Frame, import_video
+from pipeline.tracking.motion import median_uncertainty
 from reports.__main__ import main
 from reports.products.tracking import advice, figure, overlay, track_quality
 from reports.products.tracking.track_quality import ExposureStatistics, StreamProperties
@@ -211,6 +212,19 @@ def test_a_page_of_frames_without_intervals_is_made(
     assert "nan" not in page.split("<svg")[0]
     with av.open(str(tmp_path / "page/overlay.mp4")) as shown:
         assert sum(1 for _ in shown.decode(video=0)) == frames
+
+
+def test_the_page_states_the_uncertainty_that_tracking_tells(
+    track: xr.Dataset, tmp_path: Path
+) -> None:
+    track["sigma"] = track["sigma"] * xr.DataArray([0.5, 2.5, 1.0], dims="dof")
+    place, turn = median_uncertainty(track["sigma"].values)
+    assert place == pytest.approx(0.02 * np.sqrt((0.5**2 + 2.5**2) / 2))
+    words = filmed(track, tmp_path)
+    assert main(["tracking", *words, "--out-dir", str(tmp_path / "page"), "--quiet"]) == 0
+    told = (tmp_path / "page/index.html").read_text(encoding="utf-8")
+    assert f"{1000 * place:.2g} µm, root mean square of x and y" in told
+    assert f"{np.rad2deg(turn):.3f} deg" in told
 
 
 def test_the_page_says_synthetic_and_is_the_same_twice(track: xr.Dataset, tmp_path: Path) -> None:
