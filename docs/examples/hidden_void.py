@@ -18,7 +18,7 @@ scene = pressed(lattice, shortening=8.0).updated(
 limits = sim.Limits(edge_length=5.0, block_angle=np.deg2rad(30.0), void_angle=0.0, gap=0.2)
 best = sim.minimise(scene, limits, options=sim.SqpOptions(evaluations=6))
 
-before, _ = sim.evaluate(scene)  # relative mimicking error
+before, _ = sim.evaluate(scene)
 after = best.loss
 
 figure, axes = panels(2)
@@ -26,4 +26,4 @@ for panel, design, loss, colour in zip(axes, (None, best.x), (before, after), (A
     path = sim.simulate(scene, design)
     shape = None if design is None else scene.space.vertices(design)
     draw(panel, lattice, path.displacement[0, -1], vertices=shape, edgecolor=colour)
-    panel.set_title(f"mimicking error {100 * loss:.2f} %")
+    panel.set_title(f"loss {100 * loss:.2f} %")

@@ -25,6 +25,7 @@ from reports.facts import (
     copies,
     facts_of,
     grouped,
+    loss_formula,
     recording_facts,
     worded,
 )
@@ -214,7 +215,8 @@ def loss_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     start, end = mean_losses(study)
     for key, name, value in (("start", "altered", start), ("end", "cloaked", end)):
         shown = display_name(study.problem, name).lower()
-        yield _told("loss_{key}", value, key=key, shown=shown, unit=unit)
+        formula = loss_formula(study.problem)
+        yield _told("loss_{key}", value, key=key, shown=shown, unit=unit, formula=formula)
         yield from _each_load(study, f"loss_{key}", "Loss", study.response["loss"], name, unit)
     yield _told("loss_reduction", 1.0 - end / start)
     yield from _snap_facts(study, path, end, unit)

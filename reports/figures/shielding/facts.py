@@ -20,6 +20,7 @@ from reports.facts import (
     facts_of,
     foil,
     grouped,
+    loss_formula,
     measures,
     percent,
     recording_facts,
@@ -52,7 +53,7 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
     scene, design, response = study.scene, study.design, study.response
     return [
         *grouped("Scene", scene_facts(scene, design)),
-        *grouped("Shielding", loss_facts(scene, response)),
+        *grouped("Shielding", loss_facts(study)),
         *grouped("Optimisation", history_facts(design)),
         *grouped("Shape", shape_facts(scene, design)),
         *grouped("Motion of the middle unit of the top edge", motion_facts(scene, response)),
@@ -87,15 +88,16 @@ def scene_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
     yield _told("horizon", scene.horizon, cycles=scene.horizon * scene.frequency)
 
 
-def loss_facts(scene: ReportScene, response: xr.Dataset) -> Iterator[Fact]:
+def loss_facts(study: StudyResults) -> Iterator[Fact]:
     """Yields reduction of |U| and the loss before and after."""
+    scene, response = study.scene, study.response
     for suffix, until in (("", scene.horizon), ("_all", float(response["time"][-1]))):
         mean = scene.mean(measures.mean_magnitude(response, scene, until))
         yield _told(f"mean_reduction{suffix}", measures.reduction(mean), until=until)
     start, end = mean_losses(scene, response)
-    loss = response["loss"]
-    yield _loss("loss_start", start, loss, until=scene.horizon)
-    yield _loss("loss_end", end, loss, until=scene.horizon, quoted=paper_loss(start))
+    loss, of = response["loss"], {"formula": loss_formula(study.problem), "until": scene.horizon}
+    yield _loss("loss_start", start, loss, **of)
+    yield _loss("loss_end", end, loss, **of, quoted=paper_loss(start))
     for key, name in (("start", "altered"), ("end", "cloaked")):
         value = mean_loss(scene, response, "loss_samples", name)
         yield _loss("loss_samples_{key}", value, loss, key=key, name=name)

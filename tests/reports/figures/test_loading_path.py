@@ -16,7 +16,7 @@ from pipeline.posing import law_comparison
 from pipeline.problem import Output, selected_units
 from pipeline.problem.sections import ForceDrive, Paper, RotationDrive, TimeSeriesDrive, TorqueDrive
 from reports.base import style
-from reports.facts import checks, fact_records
+from reports.facts import checks, fact_records, loss_formula
 from reports.facts.copies import spreads
 from reports.figures import kinds
 from reports.figures.loading_path import abscissa, figure, measured, measures, monte_carlo
@@ -97,6 +97,32 @@ def test_contraction_of_middle_columns_and_force_on_units(smile: StudyResults) -
     forces = drive_response(smile.problem).of(smile.response).isel(case=0)
     np.testing.assert_allclose(forces.isel(time=-1), list(compressed_study.FORCE.values()))
     np.testing.assert_allclose(forces.isel(time=0), 0.0)
+
+
+def test_a_loss_has_its_formula(
+    study: StudyResults, shield: StudyResults, smile: StudyResults
+) -> None:
+    """Each over the region of interest, what is left of them told by their problems."""
+    told = {
+        "mean over the time of ‖U‖²": study,
+        "mean over the load steps of the strain energy": shield,
+        "sum over the load steps of ‖U − U₀‖², divided by ‖U₀‖ at full load": smile,
+    }
+    for words, one in told.items():
+        for key in ("loss_start", "loss_end"):
+            note = {fact.key: fact.note for fact in kinds.kind_of(one.problem).facts(one)}[key]
+            assert words in note
+            assert ("mean of the load cases" in note) == (one is study)
+    intact = smile.problem.objective
+    asked = smile.problem.model_copy(
+        update={
+            "objective": intact.model_copy(update={"reaction": 0.5}),
+            "horizon": smile.problem.horizon.model_copy(update={"steps": None}),
+        }
+    )
+    formula = loss_formula(asked)
+    assert "mean over the time of ‖U − U₀‖², divided by max ‖U₀‖," in formula
+    assert formula.endswith("; plus 0.5 times the same of the drive’s force")
 
 
 def test_a_cloak_is_as_wide_as_where_it_is_narrowest(
