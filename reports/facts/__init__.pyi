@@ -24,6 +24,6 @@ from .fact_records import share as share
 from .fact_records import table as table
 from .fact_records import within as within
 from .fact_records import worded as worded
-from .loss_formula import loss_formula as loss_formula
+from .formulas import loss_formula as loss_formula
 from .measured_constants import constants_facts as constants_facts
 from .recording_facts import intervals as intervals
