@@ -11,8 +11,14 @@ from tests.reports import compressed_study, shaken_study
 
 
 @pytest.fixture(scope="session")
-def study(tmp_path_factory: pytest.TempPathFactory) -> StudyResults:
-    return shaken_study.written(tmp_path_factory.mktemp("fig2"))
+def study_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the datasets of `study` are."""
+    return tmp_path_factory.mktemp("fig2")
+
+
+@pytest.fixture(scope="session")
+def study(study_folder: Path) -> StudyResults:
+    return shaken_study.written(study_folder)
 
 
 @pytest.fixture(scope="session")

@@ -118,16 +118,18 @@ def test_datasets_and_designs_are_those_that_the_problem_asks_for(sandbox: Sandb
 
 
 def test_preset_has_its_own_targets_and_folder(sandbox: Sandbox) -> None:
-    ended = sandbox.run("fig2@quick")
+    response = "results/fig2@quick/response.nc"
+    ended = sandbox.run(response)
     assert ended.returncode == 0, ended.stderr
-    results = sandbox.root / "results/fig2@quick"
-    assert (results / "report/fig2.pdf").exists()
-    assert "preset='quick'" in (results / "response.nc").read_text()
-    assert "Nothing to be done" in sandbox.run("fig2_quick").stderr
+    assert "preset='quick'" in (sandbox.root / response).read_text()
+    planned = sandbox.planned("fig2_quick")
+    assert planned["fig2_quick"] == planned["report"] == 1
+    assert not {"design", "select", "simulate"} & planned.keys()
 
 
 def test_second_run_has_nothing_to_do(built: Sandbox) -> None:
     os.utime(built.problem)
+    assert (built.root / "results/fig2/report/fig2.pdf").exists()
     assert "Nothing to be done" in built.run("fig2").stderr
 
 

@@ -13,6 +13,7 @@ from pipeline.__main__ import run_stage
 from pipeline.calibration import fit_calibration
 from pipeline.calibration.fit_uncertainty import adjoint_gradient, estimate_errors
 from pipeline.calibration.inputs import Calibration
+from pipeline.calibration.least_squares import Fit
 from pipeline.problem.reading import load_section
 from pipeline.problem.sections import MaterialConstants
 from tests.pipeline.calibration.specimens import (
@@ -30,12 +31,25 @@ TRUE |= {"damping_ratio": 0.0186, "damping_translation": 2.8768e-5, "damping_rot
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a calibration of forces and a decay, and what was found."""
-    folder = tmp_path_factory.mktemp("calibration")
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Fit]:
+    """A folder with a calibration of forces and a decay and with what was found, and the fit."""
+    folder, fits = tmp_path_factory.mktemp("calibration"), list[Fit]()
     path = synthesised(folder, described([*force_sets(), decay_set()], ALL, title="A specimen"))
-    assert run_stage("calibrate", [str(path), "--out", str(folder / "found.nc"), "--quiet"]) == 0
-    return folder
+
+    def fitted(asked: Calibration, path: Path) -> Fit:
+        fits.append(fit_calibration(asked, path))
+        return fits[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("pipeline.stages.calibrate.fit_calibration", fitted)
+        words = [str(path), "--out", str(folder / "found.nc"), "--quiet"]
+        assert run_stage("calibrate", words) == 0
+    return folder, fits[0]
+
+
+@pytest.fixture(scope="module")
+def made(calibrated: tuple[Path, Fit]) -> Path:
+    return calibrated[0]
 
 
 @pytest.fixture(scope="module")
@@ -98,9 +112,8 @@ def test_the_same_files_give_the_same_bytes(made: Path, tmp_path: Path) -> None:
         assert (tmp_path / name).read_bytes() == (made / name).read_bytes()
 
 
-def test_columns_of_the_jacobian_are_those_of_the_adjoint(made: Path) -> None:
-    path = made / "data/calibration.yaml"
-    fit = fit_calibration(load_section(path, Calibration), path)
+def test_columns_of_the_jacobian_are_those_of_the_adjoint(calibrated: tuple[Path, Fit]) -> None:
+    fit = calibrated[1]
     random = np.random.default_rng(4).normal(size=len(fit.residual))
     elsewhere = fit._replace(residual=random)
     columns = (fit.jacobian.T @ random)[: len(ALL)]

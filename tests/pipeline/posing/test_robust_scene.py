@@ -140,6 +140,12 @@ def _starting(fig2: Path, folder: Path, own: dict[str, object], again: dict[str,
     return path
 
 
+@pytest.fixture(scope="module")
+def chosen(fig2: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The design of the study's draft, with that of the method beside it."""
+    return designed(_starting(fig2, tmp_path_factory.mktemp("study"), {}, {}), "--preset", "quick")
+
+
 @pytest.mark.parametrize(
     ("own", "again"),
     [
@@ -153,21 +159,21 @@ def _starting(fig2: Path, folder: Path, own: dict[str, object], again: dict[str,
     ids=["same", "void", "other symmetry", "first of several"],
 )
 def test_starts_from_the_study(
-    fig2: Path, tmp_path: Path, own: dict[str, object], again: dict[str, object]
+    fig2: Path, tmp_path: Path, chosen: Path, own: dict[str, object], again: dict[str, object]
 ) -> None:
-    path = _starting(fig2, tmp_path, own, again)
+    path, out = _starting(fig2, tmp_path, own, again), tmp_path / "again.nc"
     words = ["--problem", str(path), "--method", "sqp", "--quiet", "--preset", "again"]
-    chosen, out = designed(path, "--preset", "quick"), tmp_path / "again.nc"
-    assert run_stage("design", [*words, "--start", str(chosen), "--out", str(out)]) == 0
-    first = tmp_path / "design_sqp.nc"
+    start = designed(path, "--preset", "quick") if own else chosen
+    assert run_stage("design", [*words, "--start", str(start), "--out", str(out)]) == 0
+    first = start.with_name("design_sqp.nc")
     before, after = (datasets.read(name, "design_method") for name in (first, out))
     assert float(after["loss"][0]) == pytest.approx(float(before["best_loss"]), rel=1e-6)
     assert json.loads(after.attrs["parents"])["start"]
 
 
-def test_a_start_of_other_units(fig2: Path, tmp_path: Path, failing: Failing) -> None:
+def test_a_start_of_other_units(fig2: Path, tmp_path: Path, chosen: Path, failing: Failing) -> None:
     path = _starting(fig2, tmp_path, {}, {"lattice": {"columns": 7, "rows": 7}})
-    chosen, out = designed(path, "--preset", "quick"), tmp_path / "again.nc"
+    out = tmp_path / "again.nc"
     words = ["--problem", str(path), "--preset", "again", "--method", "sqp", "--out", str(out)]
     assert "another lattice or void" in failing("design", [*words, "--start", str(chosen)])
 

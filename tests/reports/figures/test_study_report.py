@@ -51,8 +51,12 @@ def test_command_line(tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
-def test_datasets_of_another_problem_are_refused(tmp_path: Path, failing: Failing) -> None:
-    kind, *words, _, out = command(shaken_study.write(tmp_path), tmp_path / "report", "quick")
+@pytest.mark.usefixtures("study")
+def test_datasets_of_another_problem_are_refused(
+    study_folder: Path, tmp_path: Path, failing: Failing
+) -> None:
+    paths = [study_folder / f"{kind}.nc" for kind in shaken_study.KINDS]
+    kind, *words, _, out = command(paths, tmp_path / "report", "quick")
     told = failing(kind, Path(out), *words)
     assert "the dataset was made from another problem" in told
     assert "design.nc" in told
