@@ -31,7 +31,7 @@ from sim.structure import ConcreteParameters, FoilLimit, Parameters, face_strain
 LOG = logging.getLogger(__name__)
 
 SHARPNESS = 64
-"""p of the p-norm that stands for the largest strain: some 2 % to 10 % above it."""
+"""p of the p-norm that stands for the largest strain: up to some 10 % above it."""
 
 WATCHED = 12
 """Evaluations for which the way to a load is looked at after a snap on it."""
