@@ -161,6 +161,15 @@ class Loads:
 class Objective:
     """Holds what a design is to do.
 
+    The loss of a load case is made of U = (ux / s, uy / s, theta) of the region's units, with the
+    lattice's spacing s. Compared with rest it is the mean over the time of |U|^2 summed, not
+    averaged, over the units: over the duration by Simpson's rule on samples, or the average of the
+    load steps. A motion V to mimic gives a relative error, with |U - V| in place of |U| and the
+    target's size, the root of |V|^2 summed over the units: on samples the root of that mean over
+    the greatest size, on load steps the root of the sum over the steps over the last step's size
+    (the authors' measure). A strain energy, N mm, is the mean over the time of that of the
+    ligaments that touch the region, without contact, strains counted from where they rest.
+
     Attributes:
         region: (n,) ids of the units of interest.
         kind: what is compared: displacements and rotations, or the strain energy.
@@ -168,7 +177,8 @@ class Objective:
         steps: number of equal load steps that it is taken at instead; the start is none of them.
         reference: the scene whose region should move alike, its units in the same order; None to
             compare with rest.
-        reaction: weight of the relative error of the drive's force, where a reference is mimicked.
+        reaction: weight of the relative error of the drive's force, where a reference is mimicked,
+            in the sum of both.
         sharpness: p of the weighted p-mean of the cases' losses that is minimised: 1 is their mean,
             a large one a smooth maximum.
         copy_sharpness: the same of the losses of the design's imperfect copies.

@@ -205,12 +205,7 @@ def cases_of(
 def mimicking(
     scene: Scene, target: Numbers | None = None, weights: Floats | None = None
 ) -> Mimicking:
-    """Builds the loss of a scene, a function of the motion and the parameters.
-
-    On samples it is the mean over the duration, by Simpson's rule; on load steps an energy is
-    averaged. A motion to mimic gives a relative error: on samples the root of the mean square over
-    the target's greatest size, on load steps the root of the sum of squares over its size at the
-    last step (the authors' measure).
+    """Builds the loss of a scene, as of its `Objective`: of the motion and the parameters.
 
     `target` (n_cases, n_times, n_region, 3) is what ``target_motion`` returned, simulated anew if a
     scene with a reference comes without; `weights` (n_times,) are of other samples than the scene's

@@ -114,7 +114,7 @@ class LoadRanges(_Ranges):
 
 
 class ObjectiveSection(Section):
-    """Target of the surroundings or of a region.
+    """Target of the surroundings or of a region; docs/concepts.md has the formulas of the losses.
 
     Attributes:
         kind: what is compared: displacements and rotations, or the strain energy.
