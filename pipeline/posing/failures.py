@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.problem.sections import SeveralDrives, TimeSeriesDrive, single_drives
 from pipeline.runtime import UserError
+from sim.scene import SceneError
 
 if TYPE_CHECKING:
     from pipeline.problem import Problem
@@ -55,6 +56,12 @@ def unconfirmed(error: UnconfirmedError, asked: Problem, source: Path) -> UserEr
     return UserError(str(error), file=source, key="horizon.steps", remedy=remedy)
 
 
+def without_meaning(error: SceneError, source: Path | None = None) -> UserError:
+    """Explains that a scene has no meaning, by the key that it is about."""
+    what, _, remedy = str(error).partition("; ")
+    return UserError(what, file=source, key=error.key, remedy=remedy)
+
+
 def _key_of_size(asked: Problem) -> str:
     """Names the key that says how large the drive is, of several the first one's."""
     first = single_drives(asked.drive)[0]
@@ -80,6 +87,8 @@ class StoppedError(Exception):
 
     def explain(self, asked: Problem, source: Path, kept: Path | None = None) -> UserError:
         """Explains it to the user of a problem file; the dataset `kept` has what was reached."""
+        if isinstance(self.error, SceneError):
+            return without_meaning(self.error, source)
         key = _key_of_size(asked)
         lower = f"scale the motion in {key} down" if key.endswith("file") else f"lower {key}"
         remedy = f"{lower}, or ask for solver.accuracy: tight"

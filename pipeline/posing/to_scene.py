@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import problem as problems
+from pipeline.posing.failures import without_meaning
 from pipeline.problem import Problem
 from pipeline.problem.fields import csv_columns, units
 from pipeline.problem.sections import (
@@ -123,8 +124,7 @@ def scene_of(
     try:
         check_scene(posed)
     except SceneError as error:
-        what, _, remedy = str(error).partition("; ")
-        raise UserError(what, key=error.key, remedy=remedy) from error
+        raise without_meaning(error) from error
     _check_symmetry(posed)
     return posed
 

@@ -8,7 +8,7 @@ from pipeline.problem import from_canonical, load
 from pipeline.problem.identity import canonical_json
 from pipeline.runtime import UserError
 from sim.core import SimulationError
-from sim.scene import Scene, simulate
+from sim.scene import Scene, SceneError, simulate
 from tests.pipeline import static
 from tests.tables import cases, refused
 
@@ -181,3 +181,11 @@ def test_forces_on_what_nothing_holds_are_refused(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace("units: left", "units: left\n    clamp: [ux]"))
     with pytest.raises(UserError, match="nothing holds the structure against the forces"):
         scene_of(load(path), tmp_path)
+
+
+def test_a_scene_without_a_meaning_is_told_by_its_own_key(tmp_path: Path) -> None:
+    asked = load(written(tmp_path, f"drive: {RAMP}"))
+    error = SceneError("the forces balance; drive one side", "objective.reaction")
+    stopped = StoppedError(error, scene_of(asked, tmp_path), "initial", TIMES)
+    with refused("the forces balance", "objective.reaction", "drive one side"):
+        raise stopped.explain(asked, Path("problem.yaml"))
