@@ -93,8 +93,8 @@ class Response:
         """
         if not np.array_equal(self.times, sample_times(self.scene)):
             raise ValueError("the loss is taken at sample_times(scene): leave the times out")
-        place = [self.cases.index(case) for case in self.plan.case_of]
-        return mimicking(self.scene)(self.displacement, self.parameters)[np.array(place)]
+        place = np.array([self.cases.index(case) for case in self.plan.case_of])
+        return mimicking(self.scene)(self.displacement[place], self.parameters)
 
     @property
     def loss(self) -> Array:

@@ -115,6 +115,14 @@ def test_the_force_is_that_of_the_units_of_each_drive() -> None:
         np.testing.assert_allclose(response.losses, 0.0, atol=1e-9)
 
 
+def test_losses_are_in_the_order_of_the_load_cases() -> None:
+    """Whichever was simulated first: each is compared with its own target."""
+    ways = (LinearRamp(1.0, 1.0), LinearRamp(-2.0, 1.0))
+    left, right = map(PrescribedMotion, (LEFT, LEFT + 4), ways)
+    scene = squeezed_between(left, right)
+    np.testing.assert_allclose(simulate(scene, cases=(1, 0)).losses, 0.0, atol=1e-9)
+
+
 def test_a_drive_whose_forces_balance_has_none_to_mimic() -> None:
     ends = np.zeros((2, 10, 3))
     ends[1, :, 0] = np.repeat([1.0, -1.0], 5)
