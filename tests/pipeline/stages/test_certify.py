@@ -39,12 +39,20 @@ def write(fig2: Path, folder: Path, **changes: object) -> Path:
     return path
 
 
-def test_a_design_is_certified(fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module")
+def chosen(fig2: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A design of this draft, with its problem beside it."""
+    return designed(write(fig2, tmp_path_factory.mktemp("draft")))
+
+
+def test_a_design_is_certified(
+    chosen: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(certify, "LOADS", 12)
     monkeypatch.setattr(certify, "SEARCHES", 4)  # one alone may end in a lesser maximum
-    path, out = write(fig2, tmp_path), tmp_path / "certificate.nc"
+    path, out = chosen.with_name("problem.yaml"), tmp_path / "certificate.nc"
     words = ["--problem", str(path), "--quiet"]
-    certified = [*words, "--design", str(designed(path)), "--out", str(out)]
+    certified = [*words, "--design", str(chosen), "--out", str(out)]
     assert run_stage("certify", certified) == 0
     data = datasets.read(out, "certificate").squeeze("design")
     assert data["design"].item() == "cloaked"
@@ -218,15 +226,15 @@ def test_set_ups_have_loads_of_their_own(fig2: Path) -> None:
 
 
 def test_searches_that_come_to_no_load_are_told(
-    fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    chosen: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def unsolvable(*_: object) -> None:
         raise SimulationError("no equilibrium")
 
     monkeypatch.setattr(certify, "LOADS", 2)
     monkeypatch.setattr(certify, "SEARCHES", 1)
-    path, out = write(fig2, tmp_path), tmp_path / "certificate.nc"
-    words = ["--problem", str(path), "--quiet", "--design", str(designed(path))]
+    path, out = chosen.with_name("problem.yaml"), tmp_path / "certificate.nc"
+    words = ["--problem", str(path), "--quiet", "--design", str(chosen)]
     monkeypatch.setattr(LoadLosses, "__call__", unsolvable)
     assert run_stage("certify", [*words, "--out", str(out)]) == 0
     data = datasets.read(out, "certificate")
