@@ -86,10 +86,14 @@ def _clip(
     )
 
 
-def caption(recordings: Sequence[RecordedMotion]) -> str:
-    """Tells what a figure with recordings says of them, as HTML; nothing without."""
+def caption(recordings: Sequence[RecordedMotion], place: str = "") -> str:
+    """Tells what a figure with recordings says of them, as HTML; nothing without.
+
+    Snapshots of an experiment have their `place` by those of its simulation, if there are any.
+    """
     if not recordings:
         return ""
-    told = ["experiment", *["synthetic"] * any(each.synthetic for each in recordings)]
-    words = {"label": LABEL, "level": 100 * recordings[0].level}
+    told = [*["snapshots"] * bool(place), "experiment"]
+    told += ["synthetic"] * any(each.synthetic for each in recordings)
+    words = {"label": LABEL, "level": 100 * recordings[0].level, "place": place}
     return "".join(f" {_PROSE[name].format_map(words)}" for name in told)

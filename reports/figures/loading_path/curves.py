@@ -39,6 +39,7 @@ RIGHT_AXIS = 9.0
 
 _FLAT = 0.05
 """Share of the altered structure's measure below which a curve is seen on a logarithmic axis."""
+_BESIDE_TITLE = (22.0, 25.4)  # points from the upper right corner, over a paper's label
 _LINE, _MOST_ROOM = 0.1, 0.6  # of a panel's height: a line of its legend, and all lines at most
 
 
@@ -95,7 +96,7 @@ def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Meas
             "Unloaded" if problem.objective.target == "rest" else display_name(problem, "intact")
         )
         axes.plot(path.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label=f"{still}: zero")
-    if study.scatter is not None:
+    if study.scatter is not None and copies_banded(study):
         _bands(axes, study, path, measure, study.scatter)
     measured.bands(axes, study, measure.key)
     measured.measured_curves(axes, study, path, measure.of, names)
@@ -110,6 +111,12 @@ def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Meas
         # a path rises from the left, below the legend; a motion in time swings below all of it
         above = 1.1 + room if path.static else 1.05 / (1.0 - 1.2 * room)
         axes.set_ylim(0, above * axes.get_ylim()[1])
+
+
+def copies_banded(study: StudyResults) -> bool:
+    """Tests if bands of imperfect copies are drawn: prediction bands would lie over them."""
+    key = measures.measure_of(study.problem).key
+    return study.scatter is not None and not measured.has_bands(study, key)
 
 
 def _vanishes(problem: Problem, values: xr.DataArray) -> bool:
@@ -192,9 +199,10 @@ def drive_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
     _plain_panel(axes, problem, path, values, response.axis)
     if response.held and "intact" in structures(study.response) and path.static:
         off = over_cases(problem, measures.reaction_error(values)).sel(structure="cloaked")
-        axes.text(
-            0.97, 0.05, f"cloaked off\nby {100 * float(off):.1f} %", color=style.CLOAKED,
-            transform=axes.transAxes, ha="right", fontsize=style.SMALL,
+        axes.annotate(
+            f"cloaked: RMS {100 * float(off):.1f} %", (1.0, 1.0), _BESIDE_TITLE,
+            xycoords="axes fraction", textcoords="offset points", color=style.CLOAKED,
+            fontsize=style.SMALL, ha="right",
         )  # fmt: skip
     if path.static:
         if response.key == "reaction":

@@ -65,7 +65,7 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
         ),
         *_side_by_side(list(_curves(study, path)), low),
     ]
-    remark = measured_overlay.caption(study.recordings)
+    remark = measured_overlay.caption(study.recordings, grid.recorded)
     return PanelFigure(low + 48.0, panels, study.draft, remark)
 
 
@@ -136,7 +136,10 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
 def _answer(study: StudyResults, path: Abscissa) -> Curve:
     """Returns the curve of what the driven units answer with."""
     response = drive_response(study.problem)
-    words = _PROSE[response.key] + (_PROSE["eigenvalue"] if path.static else "")
+    words = _PROSE[response.key]
+    if response.held and path.static and "intact" in structures(study.response):
+        words += _PROSE["reaction_error"]
+    words += _PROSE["eigenvalue"] if path.static else ""
     if path.displaces and np.isfinite(study.response["snap_load"]).any():
         words += _PROSE["snaps"]
     return response.title, lambda axes: curves.drive_panel(axes, study, path), f"{words}.", ()
@@ -155,7 +158,7 @@ def _side_by_side(shown: Sequence[Curve], top: float) -> Iterator[Panel]:
 
 def marks(studies: Sequence[StudyResults]) -> str:
     """Tells what else is drawn with the curves of the measure, each after a semicolon."""
-    bands = any(study.scatter is not None for study in studies)
+    bands = any(curves.copies_banded(study) for study in studies)
     jumps = any((study.response["stability"] >= JUMPED).any() for study in studies)
     second = any(study.redesign is not None and study.redesign.changed for study in studies)
     shown = {"bands": bands, "jumps": jumps, "second": second}

@@ -60,9 +60,14 @@ def measured_curves(
         measured_overlay.measured_curve(axes, path.values, curve(study, path, each, of), colour)
 
 
+def has_bands(study: StudyResults, key: str) -> bool:
+    """Tests if a quantity has prediction bands."""
+    return key in _NAMES and bool(study.recordings)
+
+
 def bands(axes: Axes, study: StudyResults, key: str) -> None:
     """Draws prediction bands of a quantity, where comparisons have them."""
-    for each in study.recordings if key in _NAMES else ():
+    for each in study.recordings if has_bands(study, key) else ():
         low, high = (each.values(_followed(each, key, "simulated", end)) for end in _ENDS)
         measured_overlay.band(axes, each.along, low, high, style.STRUCTURE_COLOURS[each.structure])
 

@@ -106,6 +106,11 @@ class SnapshotLayout:
         return len(self.rows) if self.beside else len(self.path.shown)
 
     @property
+    def recorded(self) -> str:
+        """Tells where a recording is, seen from its simulation."""
+        return "left of" if self.beside else "above"
+
+    @property
     def left(self) -> float:
         """Tells where the snapshots begin so that all of them are in the middle."""
         return LABEL + (style.TWO_COLUMNS - LABEL - BAR - self.columns * self.side) / 2

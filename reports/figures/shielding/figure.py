@@ -105,7 +105,7 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
             [Table("robustness.csv", over, _map(sweep))],
         ),
     ]
-    remark = measured_overlay.caption(study.recordings)
+    remark = measured_overlay.caption(study.recordings, "above" if recorded else "")
     return PanelFigure(low + 51.0, panels, study.draft, remark)
 
 

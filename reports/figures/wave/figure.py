@@ -73,7 +73,7 @@ def wave_figure(study: StudyResults) -> PanelFigure:
             _steps(study.verification),
         ),
     ]
-    remark = measured_overlay.caption(study.recordings)
+    remark = measured_overlay.caption(study.recordings, grid.recorded)
     return PanelFigure(low + 46.0, panels, study.draft, remark)
 
 

@@ -19,7 +19,7 @@ from reports.base import style
 from reports.facts import checks, fact_records, loss_formula
 from reports.facts.copies import spreads
 from reports.figures import kinds
-from reports.figures.loading_path import abscissa, figure, measured, measures, monte_carlo
+from reports.figures.loading_path import abscissa, curves, figure, measured, measures, monte_carlo
 from reports.figures.loading_path import facts as path_facts
 from reports.figures.loading_path.drive_response import drive_response
 from reports.figures.loading_path.structure_panels import rest_panel
@@ -123,6 +123,32 @@ def test_a_loss_has_its_formula(
     formula = loss_formula(asked)
     assert "mean over the time of ‖U − U₀‖², divided by max ‖U₀‖," in formula
     assert formula.endswith("; plus 0.5 times the same of the drive’s force")
+
+
+def test_recordings_are_placed_and_have_the_only_bands(smile: StudyResults, tmp_path: Path) -> None:
+    shown = recorded_study.with_recordings(smile, tmp_path, ("altered", 0), ("cloaked", 0))
+    bands = "hold 90 % of the imperfect cloaks"
+    assert bands in figure.loading_path_figure(smile).caption
+    told = figure.loading_path_figure(shown).caption
+    assert "The experiment is shown left of its simulation" in told  # six columns
+    assert bands not in told
+    path = abscissa.abscissa_of(smile.problem, smile.response)
+    measure = measures.measure_of(smile.problem)
+    counts = []
+    for study in (smile, shown):
+        axes = Figure().add_subplot()
+        curves.measure_panel(axes, study, path, measure)
+        counts.append(len(axes.collections))
+    assert counts == [len(curves.DRAWN) + 1, 2]  # two sizes of geometry; one band a recording
+
+
+def test_the_error_of_a_reaction_stands_beside_the_title(smile: StudyResults) -> None:
+    path, axes = abscissa.abscissa_of(smile.problem, smile.response), Figure().add_subplot()
+    curves.drive_panel(axes, smile, path)
+    (told,) = axes.texts
+    assert told.get_text().startswith("cloaked: RMS ")
+    assert told.get_window_extent().y0 > axes.get_window_extent().y1
+    assert "; RMS, how far" in figure.loading_path_figure(smile).caption
 
 
 def test_a_cloak_is_as_wide_as_where_it_is_narrowest(
