@@ -22,6 +22,7 @@ _LEFT, _PITCH, _WIDTH, _HEIGHT = 13.0, 59.0, 44.0, 38.0
 _TOP, _ROW = 9.0, 50.0
 _MAP_LEFT, _MAP_WIDTH, _BAR = 15.0, 34.5, 2.2
 _MANY = 500  # points, above which they are drawn as pixels: a page has to open
+_SPARSE, _INK, _SIZES = 100, 22.0, (1.5, 3.5)  # cases; size of points by their root; points
 _BINS, _FEWEST = 10, 200  # of medians; below so many cases there are none
 
 
@@ -59,28 +60,38 @@ def draw_sweep(data: xr.Dataset, sweep: Sweep) -> Figure:
     if cases.mapped(sweep):
         return _maps(data, along, shown)
     figure = style.page(_TOP + len(along) * _ROW)
-    _titles(figure, shown)
+    look = _look(data.sizes["case"], joined=(joined := cases.ordered(sweep)))
+    _titles(figure, shown, look)
     for row, axis in enumerate(along):
         for column, measure in enumerate(shown):
             axes = style.place(figure, _LEFT + column * _PITCH, _TOP + row * _ROW, _WIDTH, _HEIGHT)
-            _against(axes, axis, measure, joined=cases.ordered(sweep))
+            _against(axes, axis, measure, look, joined=joined)
             _mark_failures(axes, axis.places[~cases.good(data)])
     return figure
 
 
-def _titles(figure: Figure, shown: Sequence[SweepMeasure]) -> None:
+def _look(count: int, *, joined: bool) -> dict[str, Any]:
+    """Returns how so many points are drawn: the fewer of them, the larger and the darker."""
+    size = float(np.clip(_INK / np.sqrt(count), *_SIZES))
+    look: dict[str, Any] = {"markersize": size, "alpha": 0.5 if count > _SPARSE else 0.9, "ls": ""}
+    look = {"markersize": 2.5, "alpha": 1.0, "ls": "-"} if joined else look
+    return look | {"marker": "o", "markeredgewidth": 0.0}
+
+
+def _titles(figure: Figure, shown: Sequence[SweepMeasure], look: dict[str, Any]) -> None:
     for column, measure in enumerate(shown):
         style.letter(figure, 1.0 + column * _PITCH, 1.0, "abc"[column], measure.title)
     colours = {"altered": style.ALTERED, "cloaked": style.CLOAKED}
-    handles = [Line2D([], [], color=colour, label=name) for name, colour in colours.items()]
+    seen = look | {"alpha": 1.0, "markersize": max(look["markersize"], 2.5)}
+    handles = [Line2D([], [], color=colour, label=name, **seen) for name, colour in colours.items()]
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.08, 0.995), ncols=2)
 
 
-def _against(axes: Axes, axis: SweepAxis, measure: SweepMeasure, *, joined: bool) -> None:
+def _against(
+    axes: Axes, axis: SweepAxis, measure: SweepMeasure, look: dict[str, Any], *, joined: bool
+) -> None:
     order = np.argsort(axis.places, kind="stable")
-    look: dict[str, Any] = {"markersize": 1.5, "alpha": 0.5, "ls": ""}
-    look = {"markersize": 2.5, "alpha": 1.0, "ls": "-"} if joined else look
-    look |= {"marker": "o", "markeredgewidth": 0.0, "rasterized": len(order) > _MANY}
+    look = look | {"rasterized": len(order) > _MANY}
     for colour, values in measure.values.items():
         axes.plot(axis.places[order], values[order], color=colour, **look)
         if not joined and not axis.words:

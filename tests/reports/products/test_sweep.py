@@ -97,6 +97,21 @@ def test_the_same_dataset_gives_the_same_bytes(tmp_path: Path, drawn_map: Path) 
     assert all((first / name).read_bytes() == (second / name).read_bytes() for name in names)
 
 
+@pytest.mark.parametrize(("samples", "size", "shade"), [(12, 3.5, 0.9), (400, 1.5, 0.5)])
+def test_few_points_are_large_and_the_legend_shows_points(
+    samples: int, size: float, shade: float, tmp_path: Path
+) -> None:
+    at, data = paths(tmp_path, RANDOM.replace("120", str(samples)))
+    sweep = problem.load(at).sweep
+    assert sweep is not None
+    made = figure.draw_sweep(datasets.read(data, "sweep"), sweep)
+    points = made.axes[0].lines[0]
+    assert points.get_markersize() == size
+    assert points.get_alpha() == shade
+    for handle in made.legends[0].get_lines():
+        assert (handle.get_marker(), handle.get_linestyle()) == ("o", "None")
+
+
 def test_words_take_places_beside_each_other(tmp_path: Path) -> None:
     _, data = paths(tmp_path, MAP)
     amplitude, law = cases.axes(datasets.read(data, "sweep"))
