@@ -54,16 +54,18 @@ def strain_facts(problem: Problem, design: xr.Dataset, response: xr.Dataset) -> 
 def strain_warning(problem: Problem, design: xr.Dataset, response: xr.Dataset) -> Iterator[str]:
     """Yields a line on the structures whose shims exceed their limit, if there are any."""
     limit, found = strain_limit(problem), shim_extremes(problem, design, response)
-    over = [
-        f"{display_name(problem, name).lower()} {percent(extremes.strain.max())}"
+    over = {
+        name: f"{display_name(problem, name).lower()} {percent(extremes.strain.max())}"
         for name, extremes in found.items()
         if extremes.strain.max() > limit
-    ]
+    }
     if over:
+        words = "take thinner foil or a smaller load"
+        if "cloaked" in over and problem.constraints.shim_strain is None:
+            words += ", or ask for constraints.shim_strain"
         yield (
             f"shims of {problem.shim_thickness:g} mm are strained beyond {percent(limit)}:"
-            f" {', '.join(over)}; take thinner foil or a smaller load, or ask for"
-            " constraints.shim_strain"
+            f" {', '.join(over.values())}; {words}"
         )
 
 

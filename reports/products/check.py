@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
@@ -24,6 +25,7 @@ from pipeline.posing import (
 from pipeline.problem import Problem
 from pipeline.runtime import write_atomically
 from reports.base import style
+from reports.figures import kinds
 from reports.figures.loading_path import DRIVE_TINT, INTEREST_TINT, UNIT_TINT, rest_panel
 from reports.panels import CLAMP_TINT, CLOAK_TINT
 from sim.scene import DOFS, Scene
@@ -42,7 +44,8 @@ def report(args: argparse.Namespace) -> None:
     asked = problem.load(args.problem, args.preset)
     scene = scene_of(asked, args.problem.parent)
     problem.check_measured_constants(asked, args.problem.parent)
-    told = [cost_line(asked, scene), *(f"warning: {line}" for line in doubts(asked, scene))]
+    found = [*doubts(asked, scene), *_unread(asked)]
+    told = [cost_line(asked, scene), *(f"warning: {line}" for line in found)]
     with style.styled():
         figure = style.page(SIDE + 22.0, SIDE)
         axes = style.place(figure, 2.0, 8.0, SIDE - 4.0, SIDE - 4.0)
@@ -54,6 +57,15 @@ def report(args: argparse.Namespace) -> None:
         with write_atomically(path) as aside:
             figure.savefig(aside, format="png", dpi=150)
     print("\n".join([*told, f"picture: {path}"]), file=sys.stderr)  # noqa: T201
+
+
+def _unread(asked: Problem) -> Iterator[str]:
+    """Doubts keys of the report that its figure does not read."""
+    if asked.report.places and kinds.kind_of(asked) is not kinds.WAVE:
+        yield (
+            "`report.places` are shown where a motion in time is to be that of the intact lattice"
+            " only; remove them"
+        )
 
 
 def _at_rest(asked: Problem, scene: Scene) -> xr.Dataset:

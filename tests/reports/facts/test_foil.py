@@ -50,6 +50,24 @@ def test_shims_in_the_void_are_strained_in_the_intact_lattice_alone(smile: Study
     assert found["altered"].strain == found["cloaked"].strain == 0.0
 
 
+@pytest.mark.parametrize(
+    ("structure", "limit", "asks"),
+    [("cloaked", None, True), ("cloaked", 1e-3, False), ("intact", None, False)],
+)
+def test_a_warning_asks_for_a_limit_that_would_help(
+    structure: str, limit: float | None, asks: bool, smile: StudyResults
+) -> None:
+    moved = 0.0 * smile.response["displacement"]
+    moved.loc[{"structure": structure, "unit": 0, "dof": "theta"}] = 1.0
+    still = smile.response.assign(displacement=moved)
+    limits = smile.problem.constraints.model_copy(update={"shim_strain": limit})
+    problem = smile.problem.model_copy(update={"constraints": limits})
+    (told,) = foil.strain_warning(problem, smile.design, still)
+    assert f": {structure} " in told
+    assert "take thinner foil" in told
+    assert ("ask for constraints.shim_strain" in told) == asks
+
+
 def test_slots_strain_the_shims_that_they_bend_before_any_load(asked: Problem) -> None:
     n_ligaments = scene_of(asked, Path()).lattice.n_ligaments
     design = bent(asked, np.radians([20.0, -20.0]) * np.ones((n_ligaments, 1)))

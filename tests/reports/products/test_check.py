@@ -57,6 +57,15 @@ def test_a_measured_motion_ends_where_the_study_does(
     np.testing.assert_allclose(moved, [0.0, -0.8])
 
 
+def test_places_that_no_figure_shows_are_doubted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    placed = "report: { places: [[30 mm, 60 mm]] }\n"
+    path = static.write(tmp_path, static.HOLE + placed, size=5, amplitude=3.0)
+    assert main(["check", "--problem", str(path), "--out-dir", str(tmp_path / "out")]) == 0
+    assert "warning: `report.places` are shown where a motion in time" in capsys.readouterr().err
+
+
 def test_measured_constants_are_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     named = "report: { measured_constants: { file: constants.csv, samples: 2 } }\n"
     path = static.write(tmp_path, static.HOLE + named, size=5, amplitude=3.0)
