@@ -60,7 +60,7 @@ def test_make_knows_its_targets(command: Command, checkout: Checkout) -> None:
 
 
 def test_targets_are_studies_products_rules_or_commands_of_make() -> None:
-    """What make cannot tell: it takes every preset of a study, and a page may run the workflow."""
+    """Holds pages to presets and products, as make takes every preset of a study."""
     built = [*targets(), "logo", "logo@quick"]
     known = {f"{name}{end}" for name in built for end in ("", *PRODUCTS)} | set(_reserved())
     asked = {

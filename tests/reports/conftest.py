@@ -12,7 +12,7 @@ from tests.reports import compressed_study, shaken_study
 
 @pytest.fixture(scope="session")
 def study_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the datasets of `study` are."""
+    """Gives the folder of the datasets of `study`."""
     return tmp_path_factory.mktemp("fig2")
 
 

@@ -1,4 +1,4 @@
-"""What a study simulates stiffer than shims is told: of an inclusion, of ligaments in a file."""
+"""Tells joints simulated stiffer than shims: those of an inclusion, of ligaments in a file."""
 
 import dataclasses
 import json

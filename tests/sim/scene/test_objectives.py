@@ -116,7 +116,7 @@ def test_the_force_is_that_of_the_units_of_each_drive() -> None:
 
 
 def test_losses_are_in_the_order_of_the_load_cases() -> None:
-    """Whichever was simulated first: each is compared with its own target."""
+    """Compares each with its own target, whichever was simulated first."""
     ways = (LinearRamp(1.0, 1.0), LinearRamp(-2.0, 1.0))
     left, right = map(PrescribedMotion, (LEFT, LEFT + 4), ways)
     scene = squeezed_between(left, right)
