@@ -5,8 +5,9 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from pipeline.problem.fields import Angle, Count, Frequency, Length, Positive, Section, Share, fault
-from pipeline.problem.sections.drives import Drive, Support, read_several
+from pipeline.problem.sections.drives import Support
 from pipeline.problem.sections.regions import Region
+from pipeline.problem.sections.several_drives import Drive, read_several
 
 
 class Load(Section):
