@@ -36,7 +36,8 @@ class SpecimenSimulation:
     solver: AnySolver  # of its motion
     drive: PrescribedMotion  # of its held units
     seen: Seen  # what is measured of the motion
-    stiffer: Floats = field(default_factory=lambda: np.ones(1))  # (n_ligaments,) or (1,) factor
+    # (n_ligaments, 3) or (1, 3) factor on axial, shear and bending stiffness
+    stiffer: Floats = field(default_factory=lambda: np.ones((1, 3)))
 
     @cached_property
     def parameters(self) -> Callable[[Numbers], Parameters[Array]]:
@@ -48,9 +49,9 @@ class SpecimenSimulation:
             axial, shear, bending, translation, rotation = (numbers[k] for k in range(5))
             made_of = Material(
                 self.density,
-                self.stiffer * axial,
-                self.stiffer * shear,
-                self.stiffer * bending,
+                self.stiffer[:, 0] * axial,
+                self.stiffer[:, 1] * shear,
+                self.stiffer[:, 2] * bending,
                 self.contact,
                 translation,
                 rotation,

@@ -12,6 +12,7 @@ from pipeline.calibration.inputs import TrackedMotion
 from pipeline.comparison import measure_places, register
 from pipeline.posing import flat_vertices, scene_of, spread
 from pipeline.problem import Problem
+from pipeline.problem.sections import STIFFNESSES
 from pipeline.runtime import UserError
 from sim.core import Floats
 from sim.scene import Scene
@@ -25,7 +26,7 @@ class TrackedSpecimen(NamedTuple):
 
     problem: Problem  # of the study
     scene: Scene  # of the structure, under the problem's drives
-    stiffer: Floats  # (n_ligaments,) factor on the stiffness of each ligament
+    stiffer: Floats  # (n_ligaments, 3) factor on axial, shear and bending stiffness
 
     def vertices(self, track: xr.Dataset, path: Path) -> Floats:
         """Reads the vertices (n_vertices, 2) as built, mm.
@@ -71,12 +72,10 @@ def pose_specimen(asked: TrackedMotion, folder: Path) -> TrackedSpecimen:
         raise UserError(what, file=path, key="case", value=asked.case, remedy=remedy)
     if asked.structure == "intact" and scene.objective.reference is not None:
         scene = scene.objective.reference
-    ones = np.ones(scene.lattice.n_ligaments)
-    return TrackedSpecimen(
-        problem,
-        scene,
-        ones * scene.structure.material.axial_stiffness / problem.material.axial_stiffness,
-    )
+    made, nominal = scene.structure.material, problem.material
+    factors = [getattr(made, name) / getattr(nominal, name) for name in STIFFNESSES]
+    each = [np.broadcast_to(factor, scene.lattice.n_ligaments) for factor in factors]
+    return TrackedSpecimen(problem, scene, np.stack(each, axis=1))
 
 
 def read_track(asked: TrackedMotion, folder: Path) -> xr.Dataset:
