@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 
 from pipeline.comparison.alignment import LEAST_FRAMES, too_few_frames
 from pipeline.comparison.registration import Registration, measure_places, register
-from pipeline.datasets.tables import TABLES
 from pipeline.posing import CLAMPED, DRIVEN
 from pipeline.runtime import UserError
 from pipeline.tracking.geometry import outlines_of_design
-from pipeline.tracking.output import drive_displacement, driven_units
+from pipeline.tracking.output import distinct_frames, drive_displacement, driven_units
 from sim.core import Floats, Ints, Mask
 
 MOST_FRAMES = 600
@@ -103,8 +102,7 @@ def _another(why: str) -> UserError:
 
 def select_frames(track: xr.Dataset) -> Ints:
     """Selects frames to compare: no duplicates, and every so many of a long track."""
-    duplicate = TABLES["track"]["timing"].flags["duplicate"]
-    frames = np.flatnonzero(track["timing"].values != duplicate)
+    frames = distinct_frames(track)
     return frames[:: -(-len(frames) // MOST_FRAMES)]
 
 

@@ -15,6 +15,7 @@ from scipy.interpolate import UnivariateSpline
 
 from pipeline.posing import PosedStructure
 from pipeline.runtime import UserError
+from pipeline.tracking.output import distinct_frames
 from sim.core import Floats, Ints, Mask, Numbers, SimulationError
 from sim.energy import observe
 from sim.scene import Scene, concrete_parameters, drive_force, simulate
@@ -72,18 +73,18 @@ class RedrivenMotion(NamedTuple):
 def filter_held_motion(track: xr.Dataset, scene: Scene) -> HeldMotion:
     """Filters the motion of the driven units and of those clamped in all three dofs.
 
-    The displacement of the track is in the specimen's frame.
+    The displacement of the track is in the specimen's frame; its duplicate frames tell nothing.
 
     Raises:
         UserError: no driven unit was seen.
     """
     unit, driven = held_units(scene)
-    seen = track.sel(unit=scene.lattice.id[unit])
+    seen = track.isel(time=distinct_frames(track)).sel(unit=scene.lattice.id[unit])
     measured, sigma = (
         seen[name].transpose("time", "unit", "dof").values.astype(float)
         for name in ("displacement", "sigma")
     )
-    time = track["time"].values - track["time"].values[0]
+    time = seen["time"].values - track["time"].values[0]
     there = np.isfinite(measured).all(axis=2) & np.isfinite(sigma).all(axis=2)
     assumed = there.sum(axis=0) < LEAST_SEEN
     if assumed[driven].all():

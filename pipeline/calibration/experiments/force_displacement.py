@@ -24,7 +24,7 @@ from pipeline.calibration.inputs import (
 from pipeline.problem.fields import csv_columns, units
 from pipeline.problem.sections import Lattice as Specimen
 from pipeline.runtime import UserError
-from pipeline.tracking.output import grip_displacement
+from pipeline.tracking.output import distinct_frames, grip_displacement
 from sim.core import Floats, Ints, Numbers
 from sim.energy import topology
 from sim.quasistatics import StaticSolver
@@ -113,13 +113,15 @@ def _read_track(path: Path, specimen: Specimen, test: TestKind) -> tuple[Floats,
     if not np.isfinite(track["load_force"]).any():
         remedy = "give load_cell in the recording's YAML, and track it again"
         raise UserError("the track has no forces", file=path, key="load_force", remedy=remedy)
-    moved = track["displacement"].transpose("time", "unit", "dof").values
+    shown = track.isel(time=distinct_frames(track))
+    moved = shown["displacement"].transpose("time", "unit", "dof").values
     site = np.array([place for _, *place in specimen.sites()])
     rows = (list(specimen.side(name)) for name in ("top", "bottom"))
     top, bottom = (grip_displacement(moved[:, row], site[row]) for row in rows)
     way = (top - bottom) @ DIRECTIONS[test]
-    seen = np.isfinite(way) & np.isfinite(track["load_force"].values)
-    return way[seen], track["load_force"].values[seen]
+    force = shown["load_force"].values
+    seen = np.isfinite(way) & np.isfinite(force)
+    return way[seen], force[seen]
 
 
 @dataclass(frozen=True)

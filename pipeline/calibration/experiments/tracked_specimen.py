@@ -14,6 +14,7 @@ from pipeline.posing import flat_vertices, scene_of, spread
 from pipeline.problem import Problem
 from pipeline.problem.sections import STIFFNESSES
 from pipeline.runtime import UserError
+from pipeline.tracking.output import distinct_frames
 from sim.core import Floats
 from sim.scene import Scene
 from sim.structure import shape
@@ -79,13 +80,14 @@ def pose_specimen(asked: TrackedMotion, folder: Path) -> TrackedSpecimen:
 
 
 def read_track(asked: TrackedMotion, folder: Path) -> xr.Dataset:
-    """Reads the track of a set.
+    """Reads the track of a set, without its duplicate frames.
 
     Raises:
         UserError: it cannot be read, or is too short.
     """
     assert asked.file is not None
     track = datasets.read(folder / asked.file, "track")
+    track = track.isel(time=distinct_frames(track))
     if track.sizes["time"] < LEAST_FRAMES * asked.every:
         what = f"only {len(track['time'][:: asked.every])} frames are taken"
         remedy = f"give a track of {LEAST_FRAMES} frames or more, or a smaller `every`"

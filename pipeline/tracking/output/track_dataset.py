@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.datasets.tables import TABLES
 from pipeline.runtime import write_atomically
 from pipeline.tracking.motion import Track
-from sim.core import Floats, Mask, Reals
+from sim.core import Floats, Ints, Mask, Reals
 
 _MOTION = ("time", "unit", "dof")
 _NUMBERS = ("ux_mm", "uy_mm", "theta_rad", "sigma_ux_mm", "sigma_uy_mm", "sigma_theta_rad")
@@ -65,6 +65,12 @@ def label_track(design: xr.Dataset, time: Floats, variables: Mapping[str, object
     made = xr.Dataset({"vertices": design["vertices"], **variables}, coordinates)
     drive = drive_displacement(made["displacement"].values, design)
     return made.assign_coords(drive_displacement=(("time", "xy"), drive))
+
+
+def distinct_frames(track: xr.Dataset) -> Ints:
+    """Numbers the frames of a track but for duplicates, which do not show their own instant."""
+    duplicate = TABLES["track"]["timing"].flags["duplicate"]
+    return np.flatnonzero(track["timing"].values != duplicate)
 
 
 def driven_units(design: xr.Dataset) -> Mask:

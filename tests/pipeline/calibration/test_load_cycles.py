@@ -175,10 +175,12 @@ def track_of(way: np.ndarray, top: slice, bottom: slice) -> xr.Dataset:
     motion[3, top.stop - 1] = np.nan
     motion[4, bottom.start] = np.nan
     coordinates = {"dof": ["ux", "uy", "theta"], "j": ("unit", np.repeat(range(4), 3))}
-    force = ("time", 3 * way)
-    return xr.Dataset(
-        {"displacement": (("time", "unit", "dof"), motion), "load_force": force}, coordinates
-    )
+    variables = {
+        "displacement": (("time", "unit", "dof"), motion),
+        "load_force": ("time", 3 * way),
+        "timing": ("time", np.zeros(len(way), np.int8)),
+    }
+    return xr.Dataset(variables, coordinates)
 
 
 def test_a_track_with_a_load_cell_is_a_test(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,6 +190,8 @@ def test_a_track_with_a_load_cell_is_a_test(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(datasets, "read", lambda *_: track)
     found = read(asked_of("run.nc"), FOLDER)
     np.testing.assert_allclose(found, [way, 3 * way], atol=1e-6)
+    track["timing"][5] = 1
+    assert len(read(asked_of("run.nc"), FOLDER)[0]) == len(way) - 1
     with refused("of 12 units, the lattice of 9", "unit"):
         read(asked_of("run.nc", lattice=LATTICE | {"rows": 3}), FOLDER)
     track["load_force"][:] = np.nan

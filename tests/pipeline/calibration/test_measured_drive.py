@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from pipeline import datasets
+from pipeline.calibration.experiments import tracked_specimen
 from pipeline.calibration.experiments.measured_drive import SmoothedDrive, smooth_drive
+from pipeline.calibration.inputs import TrackedMotion
 from pipeline.posing import scene_of
 from pipeline.problem.reading import load
 from pipeline.runtime import ROOT
@@ -40,6 +43,7 @@ def tracked(random: np.random.Generator) -> xr.Dataset:
     variables = {
         "displacement": (axes, motion),
         "sigma": (axes, np.broadcast_to(SIGMA, motion.shape)),
+        "timing": ("time", np.zeros(FRAMES, np.int8)),
     }
     return xr.Dataset(variables, {"unit": np.arange(12), "time": time})
 
@@ -88,3 +92,12 @@ def test_frames_without_a_unit_are_bridged_too_few_are_told(scene: Scene) -> Non
     assert error.max() > 2 * np.median(error)
     sparse = tracked(np.random.default_rng(3)).isel(time=slice(None, None, 5))
     assert smooth_drive(sparse, scene, BIAS).coarse
+
+
+def test_duplicate_frames_of_a_set_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    track = tracked(np.random.default_rng(5))
+    track["timing"][10::20] = 1
+    monkeypatch.setattr(datasets, "read", lambda *_: track)
+    known = {"kind": "track", "name": "run", "problem": "shaken.yaml", "file": "run.nc"}
+    read = tracked_specimen.read_track(TrackedMotion.model_validate(known), Path())
+    np.testing.assert_array_equal(read["time"], np.delete(track["time"], np.s_[10::20]))

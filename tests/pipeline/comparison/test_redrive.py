@@ -28,6 +28,7 @@ def tracked(scene: Scene, end: float, frames: int) -> tuple[xr.Dataset, np.ndarr
         {
             "displacement": (dims, motion + noise),
             "sigma": (dims, np.broadcast_to(SIGMA, motion.shape).copy()),
+            "timing": ("time", np.zeros(frames, np.int8)),
         },
         {"time": time, "unit": scene.lattice.id},
     )
@@ -72,6 +73,18 @@ def test_the_force_of_two_sides_that_were_pressed_is_the_first_ones(pressed: Sce
     structure = PosedStructure(scene, scene.lattice.vertices)
     made = simulate_redriven(structure, filter_held_motion(track, scene), track["time"].values)
     assert (made.drive_force[4:, 0] < -0.1).all()
+
+
+def test_duplicate_frames_do_not_drive(pressed: Scene) -> None:
+    track, _ = tracked(pressed, 1.0, 40)
+    shown = np.arange(40)
+    shown[5::6] -= 1
+    late = track.assign(displacement=track["displacement"].copy(data=track["displacement"][shown]))
+    late["timing"][5::6] = 1
+    ours, good = (filter_held_motion(each, pressed) for each in (late, track))
+    at = track["time"].values
+    np.testing.assert_allclose(ours.motion(at), good.motion(at), atol=5 * SIGMA[0])
+    assert not ours.filled.any()
 
 
 def test_frames_that_show_nothing_are_bridged(pressed: Scene) -> None:
