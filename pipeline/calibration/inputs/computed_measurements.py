@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from pipeline.problem.fields import Angle, Duration, Force, Frequency, Length, Samples, Section
-from pipeline.problem.sections import MaterialConstants
+from pipeline.problem.sections import NumericConstants
 
 Amplitude = Annotated[Angle, Field(gt=0.0)]
 
@@ -77,6 +77,6 @@ class ComputedMeasurements(Section):
         seed: of the noise.
     """
 
-    truth: MaterialConstants
+    truth: NumericConstants
     cutoff_angle: Angle | None = None
     seed: Annotated[int, Field(ge=0, strict=True)] = 0

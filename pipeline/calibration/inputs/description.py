@@ -13,7 +13,7 @@ from pipeline.calibration.inputs.computed_measurements import (
     VirtualTrack,
 )
 from pipeline.problem.fields import Count, File, Force, Length, Section, exactly_one, fault
-from pipeline.problem.sections import Contact, Lattice, MaterialConstants
+from pipeline.problem.sections import Contact, Lattice, NumericConstants
 
 ConstantName = Literal[
     "axial_stiffness",
@@ -216,7 +216,7 @@ class Calibration(Section):
     title: str = ""
     doc: str = ""
     spacing: Length
-    material: MaterialConstants
+    material: NumericConstants
     contact: Contact | None = None
     fit: Annotated[tuple[ConstantName, ...], Field(min_length=1)]
     data: Annotated[tuple[MeasurementSet, ...], Field(min_length=1)]

@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from pipeline.calibration.inputs.description import ForceColumns, Label
 from pipeline.calibration.inputs.population import MeasurementSource
 from pipeline.problem.fields import File, Gap, Section, fault
-from pipeline.problem.sections import Contact, Lattice, MaterialConstants
+from pipeline.problem.sections import Contact, Lattice, NumericConstants
 
 Unit = Annotated[int, Field(ge=0, strict=True)]
 
@@ -48,7 +48,7 @@ class CycleRecord(Section):
     file: File
     columns: ForceColumns = ForceColumns()
     first: Literal["dropped", "kept"] = "dropped"
-    material: MaterialConstants | None = None
+    material: NumericConstants | None = None
     contact: Contact | None = None
     play: Gap = 0.0
     known: File | None = None

@@ -12,7 +12,7 @@ from pipeline.calibration.inputs.description import (
     check_reversed,
 )
 from pipeline.problem.fields import Count, File, Length, Positive, Samples, Section, fault
-from pipeline.problem.sections import Lattice, MaterialConstants
+from pipeline.problem.sections import Lattice, NumericConstants
 
 
 class MeasurementSource(Section):
@@ -140,7 +140,7 @@ class Population(Section):
     doc: str = ""
     source: MeasurementSource
     spacing: Length
-    material: MaterialConstants
+    material: NumericConstants
     lattice: Lattice
     priors: Priors = Priors()
     data: Annotated[tuple[SampleTest, ...], Field(min_length=1)]

@@ -32,6 +32,7 @@ from .lattices import Triangular as Triangular
 from .material import STIFFNESSES as STIFFNESSES
 from .material import Contact as Contact
 from .material import MaterialConstants as MaterialConstants
+from .material import NumericConstants as NumericConstants
 from .objective import Load as Load
 from .objective import LoadRanges as LoadRanges
 from .objective import ObjectiveSection as ObjectiveSection

@@ -1,8 +1,10 @@
 """Describes a specimen's constants: units, ligaments, damping, contact."""
 
+from collections.abc import Mapping
 from typing import Literal, Self
 
 from pydantic import Field, ValidationInfo, model_validator
+from pydantic.json_schema import SkipJsonSchema
 
 from pipeline.problem.fields import (
     SIM_UNITS,
@@ -107,6 +109,27 @@ class MaterialConstants(Section):
             return law.translation, law.rotation
         stiffness = (self.shear_stiffness, self.bending_stiffness)
         return damping_of_ratio(law.ratio, self.density, spacing, *stiffness)
+
+
+class NumericConstants(MaterialConstants):
+    """Units and ligaments, told by numbers alone: those of foil follow from a lattice's lengths.
+
+    Attributes:
+        axial_stiffness: force over elongation of a ligament.
+    """
+
+    axial_stiffness: Stiffness
+    shear_stiffness: Stiffness
+    bending_stiffness: BendingStiffness
+    foil: SkipJsonSchema[FoilStrip | None] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_foil(cls, data: object) -> object:
+        if isinstance(data, Mapping) and data.get("foil") is not None:
+            remedy = f"give {', '.join(STIFFNESSES)} of one ligament in its place"
+            raise fault("foil is for problems alone: no length is told here", remedy, "foil")
+        return data
 
 
 class Contact(Section):
