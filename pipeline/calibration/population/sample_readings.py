@@ -49,22 +49,32 @@ def read_curve(asked: SampleTest, specimen: Lattice, folder: Path) -> SampleCurv
     """Reads the curve of a set, which is of a specimen.
 
     Raises:
-        UserError: the file cannot be used, or holds no force above zero at its end.
+        UserError: the file cannot be used, or holds forces not above zero late on.
     """
     displacement, force = force_displacement.read(asked, specimen, folder)
     curve = SampleCurve(asked.name, asked.test, asked.samples, displacement, force)
     late = displacement > displacement.max() / 4
-    if not (force[late] > 0).all():
-        line = int(np.flatnonzero(late & (force <= 0))[0])
-        raise UserError(
-            "the force is not above zero where the test is well on its way",
-            file=folder / asked.file,
-            key=asked.columns.force,
-            value=f"{force[line]:g} N at {displacement[line]:g} mm",
-            remedy="count displacement and force positive in the test's direction (record: reversed"
-            " turns them), and cut the file where the test ends",
-        )
+    check_forces(asked, folder, displacement[late], force[late])
     return curve
+
+
+def check_forces(asked: SampleTest, folder: Path, displacement: Floats, force: Floats) -> None:
+    """Refuses forces (n,), N, of a set that are not above zero; displacements (n,) are in mm.
+
+    Raises:
+        UserError: telling the first of them.
+    """
+    if (force > 0).all():
+        return
+    line = int(np.flatnonzero(~(force > 0))[0])
+    raise UserError(
+        "the force is not above zero where the test is on its way",
+        file=folder / asked.file,
+        key=asked.columns.force,
+        value=f"{force[line]:g} N at {displacement[line]:g} mm",
+        remedy="count displacement and force positive in the test's direction (record: reversed"
+        " turns them), cut slack off at the start (record: toe), and the file where the test ends",
+    )
 
 
 def ends(curves: Sequence[SampleCurve]) -> dict[TestKind, float]:

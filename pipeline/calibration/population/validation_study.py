@@ -46,6 +46,7 @@ from pipeline.calibration.population.prediction import (
 )
 from pipeline.calibration.population.sample_readings import (
     SampleCurve,
+    check_forces,
     ends,
     read_curve,
     stack_readings,
@@ -89,15 +90,16 @@ def validate_population(asked: Population, folder: Path) -> xr.Dataset:
     """
     random = np.random.default_rng(0)
     begin = Constants(asked.material, None, asked.spacing)
-    curves, emulators = _emulated(asked, folder, begin)
     measured = read_curve(asked.predict, asked.predict.lattice, folder)
-    end = float(measured.displacement.max())
+    shown, end = measured.ascending(POINTS), float(measured.displacement.max())
+    at = np.linspace(shown.displacement[0], shown.displacement[-1], POINTS)
+    force = np.interp(at, shown.displacement, shown.force)
+    check_forces(asked.predict, folder, at, force)
+    curves, emulators = _emulated(asked, folder, begin)
     predicted = emulate(asked.predict.lattice, asked.predict.test, begin, end)
     readings, names = stack_readings(curves, emulators, asked.samples, asked.points)
     posteriors = _fits(asked, begin.logs(ELASTIC_NAMES), readings, names)
     found = FittedPopulation(asked, curves, emulators, predicted, readings, names, posteriors)
-    shown = measured.ascending(POINTS)
-    at = np.linspace(shown.displacement[0], shown.displacement[-1], POINTS)
     kinds = list(emulators)
     curve = pose_curve(predicted, at, kinds.index(asked.predict.test))
     middle, centre = medians(posteriors[""]), begin.logs(ELASTIC_NAMES)
@@ -106,7 +108,7 @@ def validate_population(asked: Population, folder: Path) -> xr.Dataset:
     for name, given in (("", asked.priors), ("doubled", asked.priors.doubled)):
         drawn[name] = redraw_population(posteriors[name], prior_numbers(given, centre), random)
         bands[name] = find_band(new_curves(curve, drawn[name], random))
-    truth = np.log(np.interp(at, shown.displacement, shown.force))
+    truth = np.log(force)
     ranked = _ranked(found, begin, curve, truth - bands[""].median)
     priors = prior_numbers(asked.priors, centre)
     covered = try_band(readings, priors, curve, middle, asked.sampling)
@@ -143,9 +145,11 @@ def draw_constants(asked: Population, folder: Path, count: int) -> Floats:
         SimulationError: a specimen cannot be simulated.
     """
     most = asked.sampling.chains * asked.sampling.draws
-    if count > most:
-        remedy = "ask for fewer, or raise sampling.draws"
-        raise UserError(f"only {most} draws are made", key="count", value=count, remedy=remedy)
+    if not 1 <= count <= most:
+        what, remedy = f"only {most} draws are made", "ask for fewer, or raise sampling.draws"
+        if count < 1:
+            what, remedy = "no constants are drawn", "ask for one or more"
+        raise UserError(what, key="count", value=count, remedy=remedy)
     begin = Constants(asked.material, None, asked.spacing)
     curves, emulators = _emulated(asked, folder, begin)
     readings, _ = stack_readings(curves, emulators, asked.samples, asked.points)
@@ -174,9 +178,11 @@ def _emulated(
     asked: Population, folder: Path, begin: Constants
 ) -> tuple[list[SampleCurve], dict[TestKind, CurveEmulator]]:
     curves = [read_curve(each, asked.lattice, folder) for each in asked.data]
-    return curves, {
-        kind: emulate(asked.lattice, kind, begin, far) for kind, far in ends(curves).items()
-    }
+    reach = ends(curves)
+    for each, curve in zip(asked.data, curves, strict=True):
+        thin = curve.thinned(reach[curve.test], asked.points)
+        check_forces(each, folder, thin.displacement, thin.force)
+    return curves, {kind: emulate(asked.lattice, kind, begin, far) for kind, far in reach.items()}
 
 
 def _fits(

@@ -16,6 +16,7 @@ from pipeline.calibration.population import (
     missing_physics,
     prediction,
     sample_readings,
+    validation_study,
 )
 from pipeline.calibration.population.curve_emulator import CurveEmulator
 from pipeline.calibration.population.sample_readings import SampleCurve
@@ -205,6 +206,34 @@ def test_a_force_of_the_wrong_sign_is_refused(asked: Population, tmp_path: Path)
     wrong = asked.data[0].model_copy(update={"file": "pull.csv"})
     with refused("not above zero", "force", file=tmp_path / "pull.csv"):
         sample_readings.read_curve(wrong, asked.lattice, tmp_path)
+
+
+def early_slack(folder: Path) -> str:
+    """Writes a curve whose force is below zero on the first part of its way."""
+    lines = "\n".join(f"{0.1 * k},{k - 5}" for k in range(1, 41))
+    (folder / "slack.csv").write_text(f"displacement (mm),force (N)\n{lines}\n")
+    return "slack.csv"
+
+
+def test_forces_below_zero_early_on_are_refused_before_a_fit(
+    asked: Population, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(validation_study, "emulate", lambda *_: pytest.fail("emulated"))
+    slack = str(tmp_path / early_slack(tmp_path))
+    samples = tuple(
+        each.model_copy(update={"file": slack}) if each.test == asked.predict.test else each
+        for each in asked.data
+    )
+    predict = asked.predict.model_copy(update={"file": slack})
+    for changed in ({"data": samples, "points": 20}, {"predict": predict}):
+        with refused("not above zero", "force", "record: toe", file=Path(slack)):
+            validation_study.validate_population(asked.model_copy(update=changed), FILE.parent)
+
+
+@pytest.mark.parametrize(("count", "told"), [(0, "no constants"), (-3, "no"), (10**6, "only")])
+def test_a_count_of_draws_that_is_refused(asked: Population, count: int, told: str) -> None:
+    with refused(told, "count"):
+        validation_study.draw_constants(asked, FILE.parent / "nowhere", count)
 
 
 def test_priors_are_doubled_in_their_logarithms(asked: Population) -> None:
