@@ -15,7 +15,7 @@ from pipeline.posing.structure_variables import (
 )
 from pipeline.posing.to_scene import contact_laws, lattice_of
 from pipeline.problem import Problem
-from pipeline.problem.sections import single_drives
+from pipeline.problem.sections import TimeSeriesDrive, single_drives
 from sim.core import Floats
 
 _MOTION = ("structure", "case", "time", "unit", "dof")
@@ -32,6 +32,9 @@ _OBSERVED = {
 _OF_STEPS = ("roi_energy", "gap", "overlapping", "stability", "snap", "eigenvalue")
 _OF_CASES = ("loss", "loss_other_branch", "loss_samples", "loss_error", "displacement_error")
 
+_BACK = 0.5
+"""Share of its largest displacement that a swinging motion goes to the other side."""
+
 Table = dict[str, list[CaseResult]]
 
 
@@ -40,6 +43,7 @@ def assemble_response(
 ) -> xr.Dataset:
     """Assembles the dataset ``response`` at the times shown."""
     shown, scene = times.asked[times.shown], structures["altered"].scene
+    drive = _drive(structures, shown)
     variables = {
         **network_variables(asked, scene),
         **_over_units(asked, structures, measured),
@@ -47,11 +51,11 @@ def assemble_response(
         **_over_cases(measured),
         **_snaps(measured),
         **by_contact(structures, contact_laws(asked), times, measured),
-        "drive_displacement": (("case", "time", "xy"), _drive(structures, shown)),
+        "drive_displacement": (("case", "time", "xy"), drive),
     }
     for name in ("loss", "loss_other_branch", "loss_samples", "loss_by_contact"):
         variables[name] = (*variables[name], {"units": loss_units(asked)})
-    return xr.Dataset(variables, _coordinates(asked, structures, shown))
+    return xr.Dataset(variables, _coordinates(asked, structures, shown, drive))
 
 
 def loss_units(asked: Problem) -> str:
@@ -59,9 +63,33 @@ def loss_units(asked: Problem) -> str:
     return "N mm" if asked.objective.kind == "strain_energy" else "1"
 
 
-def case_directions(asked: Problem) -> list[float]:
-    """Lists the direction of each load case in rad; zero for a drive that has none."""
+def case_directions(asked: Problem, moved: Floats | None = None) -> list[float]:
+    """Lists the direction of each load case in rad; zero for a drive that has none.
+
+    A motion read from a file has that of the displacement `moved` (n_cases, n_times, 2) by it.
+    """
+    if moved is not None and isinstance(single_drives(asked.drive)[0], TimeSeriesDrive):
+        return [course_direction(course) or 0.0 for course in moved]
     return list(getattr(asked.drive, "directions", (0.0,)))
+
+
+def course_direction(course: Floats) -> float | None:
+    """Finds the direction in rad of the largest of displacements (n_times, 2), if there is any.
+
+    Of a motion that swings it is the one to the right.
+    """
+    x, y = course[np.hypot(*course.T).argmax()]
+    if np.hypot(x, y) == 0.0:
+        return None
+    angle = float(np.arctan2(y, x))
+    leftward = not -np.pi / 2 < angle <= np.pi / 2
+    return angle - float(np.copysign(np.pi, angle)) if leftward and course_swings(course) else angle
+
+
+def course_swings(course: Floats) -> bool:
+    """Tests if displacements (n_times, 2) go to both sides of where they start."""
+    along = course @ course[np.hypot(*course.T).argmax()]
+    return bool(along.min() < -_BACK * along.max())
 
 
 def _gather(measured: Table, of_case: Callable[[CaseResult], object]) -> Floats:
@@ -156,8 +184,10 @@ def _drive(structures: dict[str, PosedStructure], times: Floats) -> Floats:
     return np.asarray(moved.mean(axis=2))
 
 
-def _coordinates(asked: Problem, structures: dict[str, PosedStructure], times: Floats) -> Variables:
-    directions, drive = case_directions(asked), single_drives(asked.drive)[0]
+def _coordinates(
+    asked: Problem, structures: dict[str, PosedStructure], times: Floats, moved: Floats
+) -> Variables:
+    directions, drive = case_directions(asked, moved), single_drives(asked.drive)[0]
     frequency = np.nan if asked.frequency is None else asked.frequency
     return {
         **unit_coordinates(lattice_of(asked)),

@@ -119,7 +119,7 @@ def _described(
     }
     coordinates = {
         **unit_coordinates(intact),
-        "direction": ((), np.rad2deg(case_directions(asked)[case])),
+        "direction": ((), np.rad2deg(case_directions(asked, drive[None])[case])),
         "time": (("time",), times),
         "dof": (("dof",), ["ux", "uy", "theta"]),
     }

@@ -78,7 +78,7 @@ def _units(problem: Problem) -> list[int]:
 def _along(problem: Problem, vector: xr.DataArray, response: xr.Dataset) -> xr.DataArray:
     """Returns the part (structure, case, time) along the first drive's direction."""
     direction, drive = response["direction"], single_drives(problem.drive)[0]
-    if isinstance(drive, TimeSeriesDrive):  # of which the dataset tells no direction
+    if isinstance(drive, TimeSeriesDrive):  # one for all structures and cases
         found = drive_directions(drive, response, _units(problem))
         direction = xr.full_like(direction, np.degrees(next(iter(found), 0.0)))
     angle = np.radians(direction)
