@@ -32,7 +32,7 @@ class Measurement(NamedTuple):
     centre: Floats  # (n_units, 2) at rest by the design, mm; NaN for those that are absent
     registration: Registration  # of the units at rest
     track: xr.Dataset  # the whole of it, turned into the design's frame
-    drive: Floats  # (n_frames, 2) mean displacement of the driven units, mm; NaN while none is seen
+    drive: Floats  # (n_frames, 2) mean displacement at the drive, mm; NaN while none is seen
     force: Floats  # (n_frames,) of the load cell, N; NaN without
 
     @property
@@ -41,13 +41,17 @@ class Measurement(NamedTuple):
         return np.asarray(self.use == COMPARED)
 
 
-def prepare_measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
+def prepare_measurement(
+    track: xr.Dataset, design: xr.Dataset, leading: Ints | None = None
+) -> Measurement:
     """Prepares the measured side of a comparison: a track, and the design as built.
+
+    The units `leading` are those whose displacement is the drive's; by default all that are driven.
 
     Raises:
         UserError: the track is not of this design, shows no driven units, or is too short.
     """
-    check_track(track, design)
+    check_track(track, design, leading)
     centre = _centres(design)
     found = register(centre, measure_places(track, centre))
     motion = found.upright(track["displacement"].values.astype(float))
@@ -64,12 +68,12 @@ def prepare_measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
         centre=centre,
         registration=found,
         track=turned,
-        drive=drive_displacement(displacement, design),
+        drive=drive_displacement(displacement, design, leading),
         force=shown["load_force"].values,
     )
 
 
-def check_track(track: xr.Dataset, design: xr.Dataset) -> None:
+def check_track(track: xr.Dataset, design: xr.Dataset, leading: Ints | None = None) -> None:
     """Refuses a track that is not of a design, in which no driven unit is seen, or that is short.
 
     Raises:
@@ -82,7 +86,9 @@ def check_track(track: xr.Dataset, design: xr.Dataset) -> None:
         raise _another("other units are absent, or they have other vertices")
     if (apart := float(np.nanmax(np.abs(tracked - built)))) > _SAME:
         raise _another(f"vertices are up to {apart:.2f} mm from where the design has them")
-    seen = np.isfinite(track["displacement"].values[:, driven_units(design), 0]).any(axis=1)
+    seen = np.isfinite(track["displacement"].values[:, driven_units(design, leading), 0]).any(
+        axis=1
+    )
     if not seen.any():
         what = "no driven unit is seen in any frame: there is nothing to align with"
         remedy = "film the driven units too, or give a window that shows them"

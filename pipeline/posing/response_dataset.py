@@ -171,7 +171,7 @@ def _snaps(measured: Table) -> Variables:
 
 
 def _drive(structures: dict[str, PosedStructure], times: Floats) -> Floats:
-    """Computes the mean displacement (n_cases, n_times, 2) of the driven units, mm.
+    """Computes the mean displacement (n_cases, n_times, 2) of the first drive's units, mm.
 
     Degrees of freedom that are not displaced count as at rest.
     """
@@ -180,7 +180,9 @@ def _drive(structures: dict[str, PosedStructure], times: Floats) -> Floats:
     held, top = scene.loads.held, scene.topology
     for case, drive in enumerate(scene.loads.cases):
         of_units[case][:, held] = drive.values(top.held, times)[:, : len(held)]
-    moved = of_units.reshape(*of_units.shape[:2], -1, 3)[:, :, scene.loads.driven, :2]
+    first = np.isin(scene.loads.driven, scene.loads.cases[0].leading)
+    units = scene.loads.driven[first]
+    moved = of_units.reshape(*of_units.shape[:2], -1, 3)[:, :, units, :2]
     return np.asarray(moved.mean(axis=2))
 
 

@@ -69,9 +69,11 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     provenance.check_parent(whole, args.response, "design", args.design)
     response = chosen(whole, recording)
     built = as_built(design, recording.structure)
-    measured = prepare_measurement(datasets.read(args.track, "track"), built)
-    shown = find_axis(measured.time, measured.drive, response, static=asked.static)
     structure = structures_of(scene_of(asked, args.problem.parent), design)[recording.structure]
+    scene = structure.scene
+    leading = scene.lattice.id[scene.loads.cases[0].leading]
+    measured = prepare_measurement(datasets.read(args.track, "track"), built, leading)
+    shown = find_axis(measured.time, measured.drive, response, static=asked.static)
     way = drive_direction(response)
     inside = measured.compared & (built["roi"].values == 1)
     every = whole.isel(case=recording.case)

@@ -73,15 +73,24 @@ def distinct_frames(track: xr.Dataset) -> Ints:
     return np.flatnonzero(track["timing"].values != duplicate)
 
 
-def driven_units(design: xr.Dataset) -> Mask:
-    """Marks the units (units,) of the design that are driven."""
+def driven_units(design: xr.Dataset, leading: Ints | None = None) -> Mask:
+    """Marks the units (units,) of the design that are driven.
+
+    Of drives that act at once, those of one alone are if its units are given as `leading`.
+    """
     flag = TABLES["design"]["support"].flags["driven"]
-    return np.asarray(design["support"].values == flag)
+    driven = np.asarray(design["support"].values == flag)
+    return driven if leading is None else driven & np.isin(design["unit"].values, leading)
 
 
-def drive_displacement(displacement: Floats, design: xr.Dataset) -> Floats:
-    """Averages displacements (frames, units, 3) over the driven units: (frames, 2), NaN without."""
-    driven = driven_units(design)
+def drive_displacement(
+    displacement: Floats, design: xr.Dataset, leading: Ints | None = None
+) -> Floats:
+    """Averages displacements (frames, units, 3) over the driven units: (frames, 2), NaN without.
+
+    Which these are: see `driven_units`.
+    """
+    driven = driven_units(design, leading)
     start = design["vertices"].mean("vertex").transpose("unit", "xy").values[driven]
     return grip_displacement(displacement[:, driven], start)
 
