@@ -251,8 +251,31 @@ def _faults(asked: Calibration) -> list[tuple[str, str, str]]:
     if asked.contact is not None and asked.contact.law != "angle":
         remedy = "give contact of law: angle, or none"
         found.append(("contact by the law of distance is not known here", remedy, "contact"))
+    found += _start_faults(asked)
     computed = [each.virtual is not None for each in asked.data]
     if any(computed) != (asked.virtual is not None):
         remedy = "give virtual.truth with virtual sets, and only then"
         found.append(("data are computed with true constants", remedy, "virtual"))
+    return found
+
+
+def _start_faults(asked: Calibration) -> list[tuple[str, str, str]]:
+    """Checks the values to start from, and the true ones: fault, remedy, key."""
+    found = []
+    for part in ("ratio", "translation", "rotation"):
+        if f"damping_{part}" in asked.fit and getattr(asked.material.damping, part) == 0.0:
+            what = "a wanted constant starts at zero, and steps are by factors"
+            found.append((what, "give a value above zero", f"material.damping.{part}"))
+    contact = asked.contact
+    if "contact_cutoff" in asked.fit and contact and contact.cutoff_angle <= contact.barrier_angle:
+        remedy = "start from an angle above the barrier_angle"
+        found.append(("the cut-off starts below the barrier", remedy, "contact.cutoff_angle"))
+    known = {"material": asked.material}
+    if asked.virtual is not None:
+        known["virtual.truth"] = asked.virtual.truth
+    for key, material in known.items():
+        critical = material.damping.ratio is not None and material.damping.ratio >= 1.0
+        if critical and any(isinstance(each, FreeDecay) for each in asked.data):
+            what = "nothing swings at such a damping ratio, and a free decay is of swings"
+            found.append((what, "give a ratio below one", f"{key}.damping.ratio"))
     return found
