@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from pipeline.calibration.inputs.computed_measurements import (
     Amplitude,
@@ -13,7 +13,7 @@ from pipeline.calibration.inputs.computed_measurements import (
     VirtualTrack,
 )
 from pipeline.problem.fields import Count, File, Force, Length, Section, exactly_one, fault
-from pipeline.problem.sections import Contact, Lattice, NumericConstants
+from pipeline.problem.sections import Contact, Lattice, ListedNetwork, NumericConstants
 
 ConstantName = Literal[
     "axial_stiffness",
@@ -26,6 +26,19 @@ ConstantName = Literal[
 ]
 
 TestKind = Literal["tension", "compression", "shear"]
+
+
+def _alike(lattice: Lattice) -> Lattice:
+    """Refuses ligaments with stiffnesses of their own: all are made of the same constants here."""
+    listed = (isinstance(lattice, ListedNetwork) and lattice.stiffnesses) or ()
+    if any(value is not None for own in listed for value in own):
+        what = "the file gives ligaments stiffnesses of their own, and all have the same ones here"
+        raise fault(what, "leave those columns out of the file", "file")
+    return lattice
+
+
+Specimen = Annotated[Lattice, AfterValidator(_alike)]
+"""Lattice whose ligaments are all of the same constants."""
 Label = Annotated[str, StringConstraints(pattern=r"^\w+$")]
 
 
@@ -90,7 +103,7 @@ class ForceDisplacement(Section):
     name: Label
     file: File | None = None
     virtual: VirtualForces | None = None
-    lattice: Lattice
+    lattice: Specimen
     test: TestKind
     columns: ForceColumns = ForceColumns()
     record: RecordOptions | None = None

@@ -4,10 +4,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.calibration.inputs.description import ForceColumns, Label
+from pipeline.calibration.inputs.description import ForceColumns, Label, Specimen
 from pipeline.calibration.inputs.population import MeasurementSource
 from pipeline.problem.fields import File, Gap, Section, fault
-from pipeline.problem.sections import Contact, Lattice, NumericConstants
+from pipeline.problem.sections import Contact, NumericConstants
 
 Unit = Annotated[int, Field(ge=0, strict=True)]
 
@@ -80,6 +80,6 @@ class LoadCycles(Section):
     title: str = ""
     doc: str = ""
     source: MeasurementSource
-    lattice: Lattice
+    lattice: Specimen
     drive: PathDrive
     records: Annotated[tuple[CycleRecord, ...], Field(min_length=1)]

@@ -8,11 +8,12 @@ from pipeline.calibration.inputs.description import (
     ForceColumns,
     Label,
     RecordOptions,
+    Specimen,
     TestKind,
     check_reversed,
 )
 from pipeline.problem.fields import Count, File, Length, Positive, Samples, Section, fault
-from pipeline.problem.sections import Lattice, NumericConstants
+from pipeline.problem.sections import NumericConstants
 
 
 class MeasurementSource(Section):
@@ -71,7 +72,7 @@ class PredictedTest(SampleTest):
         simulated: a curve that others simulated, to be shown on the same axes.
     """
 
-    lattice: Lattice
+    lattice: Specimen
     simulated: File | None = None
 
 
@@ -141,7 +142,7 @@ class Population(Section):
     source: MeasurementSource
     spacing: Length
     material: NumericConstants
-    lattice: Lattice
+    lattice: Specimen
     priors: Priors = Priors()
     data: Annotated[tuple[SampleTest, ...], Field(min_length=1)]
     predict: PredictedTest

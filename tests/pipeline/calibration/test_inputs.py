@@ -84,6 +84,31 @@ def test_faulty_calibrations(
     assert list(tmp_path.iterdir()) == [path]
 
 
+OWN = """kind,number,x (mm),y (mm),shear (N/mm)
+unit,0,0,0,
+unit,0,6,0,
+unit,0,6,6,
+unit,1,8,6,
+unit,1,14,6,
+unit,1,14,12,
+ligament,0,6,6,2.0
+ligament,0,8,6,2.0
+"""
+
+
+def test_stiffnesses_of_single_ligaments_are_refused(tmp_path: Path, failing: Failing) -> None:
+    (tmp_path / "own.csv").write_text(OWN, encoding="utf-8")
+    own = {"kind": "file", "file": "own.csv", "spacing": "8 mm"}
+    data = [each | {"lattice": own} for each in force_sets()]
+    path = written(tmp_path, described(data, ["shear_stiffness"]))
+    told = failing("calibrate", [str(path), "--out", str(tmp_path / "found.nc")])
+    assert "leave those columns out" in told
+    assert "data[0].lattice" in told
+    (tmp_path / "own.csv").write_text(OWN.replace("2.0", ""), encoding="utf-8")
+    told = failing("calibrate", [str(path), "--out", str(tmp_path / "found.nc")])
+    assert "synthesise" in told
+
+
 def test_computed_data_have_to_be_computed_first(tmp_path: Path, failing: Failing) -> None:
     path = written(tmp_path, described([decay_set()], ["damping_ratio"]))
     assert "synthesise" in failing("calibrate", [str(path), "--out", str(tmp_path / "found.nc")])
