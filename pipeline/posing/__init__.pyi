@@ -21,9 +21,9 @@ from .first_look import soft_units as soft_units
 from .perturbed import drawn as drawn
 from .response_dataset import assemble_response as assemble_response
 from .response_dataset import case_directions as case_directions
-from .response_dataset import course_direction as course_direction
-from .response_dataset import course_swings as course_swings
 from .response_dataset import loss_units as loss_units
+from .response_dataset import main_direction as main_direction
+from .response_dataset import swings_back as swings_back
 from .robust_scene import design_scene as design_scene
 from .robust_scene import greatest_loss as greatest_loss
 from .robust_scene import load_family as load_family

@@ -69,11 +69,11 @@ def case_directions(asked: Problem, moved: Floats | None = None) -> list[float]:
     A motion read from a file has that of the displacement `moved` (n_cases, n_times, 2) by it.
     """
     if moved is not None and isinstance(single_drives(asked.drive)[0], TimeSeriesDrive):
-        return [course_direction(course) or 0.0 for course in moved]
+        return [main_direction(course) or 0.0 for course in moved]
     return list(getattr(asked.drive, "directions", (0.0,)))
 
 
-def course_direction(course: Floats) -> float | None:
+def main_direction(course: Floats) -> float | None:
     """Finds the direction in rad of the largest of displacements (n_times, 2), if there is any.
 
     Of a motion that swings it is the one to the right.
@@ -83,10 +83,10 @@ def course_direction(course: Floats) -> float | None:
         return None
     angle = float(np.arctan2(y, x))
     leftward = not -np.pi / 2 < angle <= np.pi / 2
-    return angle - float(np.copysign(np.pi, angle)) if leftward and course_swings(course) else angle
+    return angle - float(np.copysign(np.pi, angle)) if leftward and swings_back(course) else angle
 
 
-def course_swings(course: Floats) -> bool:
+def swings_back(course: Floats) -> bool:
     """Tests if displacements (n_times, 2) go to both sides of where they start."""
     along = course @ course[np.hypot(*course.T).argmax()]
     return bool(along.min() < -_BACK * along.max())

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from pipeline.posing import course_direction, course_swings
+from pipeline.posing import main_direction, swings_back
 from pipeline.problem.sections import SingleDrive, TimeSeriesDrive
 from sim.core import Floats
 
@@ -20,13 +20,13 @@ def drive_directions(
     """
     if not isinstance(drive, TimeSeriesDrive):
         return tuple(getattr(drive, "directions", ()))
-    found = course_direction(_course(response, units))
+    found = main_direction(_course(response, units))
     return () if found is None else (found,)
 
 
 def swings(drive: SingleDrive, response: xr.Dataset, units: Sequence[int]) -> bool:
     """Tests if a drive is a measured motion that goes to both sides of where it starts."""
-    return isinstance(drive, TimeSeriesDrive) and course_swings(_course(response, units))
+    return isinstance(drive, TimeSeriesDrive) and swings_back(_course(response, units))
 
 
 def _course(response: xr.Dataset, units: Sequence[int]) -> Floats:

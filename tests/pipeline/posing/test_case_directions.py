@@ -7,7 +7,7 @@ import pytest
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from pipeline.posing import case_directions, course_direction
+from pipeline.posing import case_directions, main_direction
 from pipeline.problem import load
 from tests.pipeline import static, unchanged
 
@@ -38,7 +38,7 @@ def test_a_measured_motion_has_the_direction_of_its_largest_displacement(shaken:
 
 
 def test_a_motion_that_only_turns_has_none(shaken: Path) -> None:
-    assert course_direction(np.zeros((3, 2))) is None
+    assert main_direction(np.zeros((3, 2))) is None
     assert case_directions(load(shaken), np.zeros((1, 3, 2))) == [0.0]
 
 
