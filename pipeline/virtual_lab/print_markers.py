@@ -1,10 +1,7 @@
 """Prints sheets of marks for the tracking, at true size, to stick on the units."""
 
-from __future__ import annotations
-
 import argparse
 import logging
-from typing import TYPE_CHECKING
 
 from pipeline import datasets
 from pipeline.fabrication.parts import labels
@@ -13,9 +10,6 @@ from pipeline.runtime import UserError, write_atomically
 from pipeline.tracking.geometry import as_built, outlines_of_design
 from pipeline.virtual_lab import stickers
 from pipeline.virtual_lab.face_marks import draw_marks
-
-if TYPE_CHECKING:
-    from pipeline.problem.sections import UnitAppearance
 
 LOG = logging.getLogger(__name__)
 
@@ -39,11 +33,15 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _look(args: argparse.Namespace) -> UnitAppearance:
-
-    diameter = args.diameter or (2.0 if args.kind == "dots" else 1.2)
-    if not (0.3 <= diameter <= 10.0 and 0.0 < args.spread < 100.0):
-        remedy = "give a diameter from 0.3 mm to 10 mm and a positive spread"
-        raise UserError("marks of such a size cannot be printed", value=diameter, remedy=remedy)
+    usual = 2.0 if args.kind == "dots" else 1.2
+    diameter = usual if args.diameter is None else args.diameter
+    for key, value, fits, remedy in (
+        ("--diameter", diameter, 0.3 <= diameter <= 10.0, "give 0.3 mm to 10 mm"),
+        ("--spread", args.spread, 0.0 < args.spread < 100.0, "give more than 0 mm and less than 100 mm"),
+    ):
+        if not fits:
+            what = "marks of such a size cannot be printed"
+            raise UserError(what, key=key, value=value, remedy=remedy)
     dots = Markers.model_construct(
         kind="dots", count=args.count, spread=args.spread, diameter=diameter, depth=0.4
     )

@@ -51,6 +51,14 @@ def test_speckle_is_thrown_on_all_faces(design: Path, tmp_path: Path) -> None:
     assert page.count(" c ") + page.count(" c\n") > 16 * 10 * 4
 
 
-def test_dots_beyond_print_are_refused(design: Path, tmp_path: Path, failing: Failing) -> None:
-    words = ["--design", str(design), "--out", str(tmp_path / "marks.pdf"), "--diameter", "40"]
-    assert "cannot be printed" in failing("markers", words)
+@pytest.mark.parametrize(
+    ("option", "value"), [("diameter", "40"), ("diameter", "0"), ("spread", "0"), ("spread", "200")]
+)
+def test_dots_beyond_print_are_refused(
+    design: Path, tmp_path: Path, failing: Failing, option: str, value: str
+) -> None:
+    words = ["--design", str(design), "--out", str(tmp_path / "marks.pdf"), f"--{option}", value]
+    told = failing("markers", words)
+    assert "cannot be printed" in told
+    assert f"--{option}" in told
+    assert f"value:  {float(value)}" in told
