@@ -49,6 +49,8 @@ def _plan(args: argparse.Namespace) -> None:
     asked = recordings.Recording(virtual=VirtualRecording())
     if args.recording is not None:
         asked = recordings.load_recording(args.recording)
+    if asked.virtual is not None and asked.virtual.specimen is not None:
+        LOG.info("virtual.specimen is left out: clips show the design's own response")
     response = datasets.read(args.response, "response")
     structure = args.structure or asked.structure
     case = asked.case if args.case is None else args.case

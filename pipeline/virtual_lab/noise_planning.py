@@ -43,6 +43,7 @@ class PlannedSetup(NamedTuple):
             "mm_per_px": f"{camera.pixel_size:.3g}",
             "image": "x".join(map(str, camera.image)),
             "fps": f"{self.setup.rate:g}",
+            "exposure_ms": f"{1000 * self.setup.sensor.exposure:.3g}",
             "codec": codec.name if codec.name == "ffv1" else f"{codec.name} crf {codec.crf}",
             "marker_mm": f"{markers.get(self.specimen, 0):g}",
         }
@@ -79,7 +80,7 @@ class SetupOptions(NamedTuple):
 
 
 def setup_combinations(base: PlannedSetup, tried: SetupOptions) -> list[PlannedSetup]:
-    """Combines the options in every way.
+    """Combines the options in every way; no exposure is longer than a frame lasts.
 
     Raises:
         UserError: a value that makes no sense.
@@ -128,7 +129,10 @@ def _chosen(
         look = look.model_copy(
             update={k: v.model_copy(update={"diameter": marker}) for k, v in kinds.items()}
         )
+    sensor = base.setup.sensor
+    exposure = min(sensor.exposure, 1 / rate)
     update = {
+        "sensor": sensor.model_copy(update={"exposure": exposure}),
         "camera": camera.model_copy(update={"pixel_size": pixel, "image": image}),
         "rate": rate,
         "codec": chosen,
@@ -167,7 +171,7 @@ def _clip(setup: VirtualRecording, given: Floats, count: int) -> VirtualRecordin
     """
     resting = min(RESTING, count // 2)
     whole = film_clock(given, setup)
-    end = min(whole.start + (count - resting) / setup.rate * whole.pace, whole.end)
+    end = min(whole.start + (count - 1 - resting) / setup.rate * whole.pace, whole.end)
     length = (end - whole.start) / whole.pace
     shown = {"still": resting / setup.rate, "end": end, "duration": length}
     return setup.model_copy(update=shown)

@@ -37,7 +37,12 @@ def _look(args: argparse.Namespace) -> UnitAppearance:
     diameter = usual if args.diameter is None else args.diameter
     for key, value, fits, remedy in (
         ("--diameter", diameter, 0.3 <= diameter <= 10.0, "give 0.3 mm to 10 mm"),
-        ("--spread", args.spread, 0.0 < args.spread < 100.0, "give more than 0 mm and less than 100 mm"),
+        (
+            "--spread",
+            args.spread,
+            0.0 < args.spread < 100.0,
+            "give more than 0 mm and less than 100 mm",
+        ),
     ):
         if not fits:
             what = "marks of such a size cannot be printed"

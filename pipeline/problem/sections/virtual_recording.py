@@ -1,8 +1,8 @@
 """The section `virtual` of a recording: what is filmed in the virtual lab, and with what."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pipeline.problem.fields import (
     Angle,
@@ -15,12 +15,14 @@ from pipeline.problem.fields import (
     Positive,
     Ratio,
     Section,
+    fault,
 )
 from pipeline.problem.sections.fabrication import Markers
 from pipeline.problem.sections.virtual_specimen import SpecimenFaults, VirtualLoadCell
 
 Shade = Annotated[float, Field(ge=0.0, le=1.0)]
 Size = Annotated[int, Field(ge=64, le=8192, strict=True)]
+_ROUNDING = 1e-9
 
 
 class CameraView(Section):
@@ -99,7 +101,7 @@ class Sensor(Section):
     """Optics and sensor.
 
     Attributes:
-        exposure: of a frame, centred about its time.
+        exposure: of a frame, centred about its time; no longer than a frame lasts.
         blur: standard deviation of the optics' blur, px.
         full_well: electrons at the end of the range.
         read_noise: electrons.
@@ -161,3 +163,11 @@ class VirtualRecording(Section):
     codec: Codec = Codec()
     load_cell: VirtualLoadCell | None = None
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
+
+    @model_validator(mode="after")
+    def _exposed_in_time(self) -> Self:
+        if self.sensor.exposure * self.rate > 1.0 + _ROUNDING:
+            what = f"an exposure of {self.sensor.exposure:g} s is longer than a frame lasts"
+            remedy = f"give {1 / self.rate:.3g} s at most, or a lower virtual.rate"
+            raise fault(what, remedy, "sensor.exposure")
+        return self

@@ -43,7 +43,7 @@ def test_a_clip_is_the_beginning_of_the_film(
         expected(**changes)
     film = film_of("bare", **{**changes, "still": "0.3 s"}).motion
     count = len(clips[0].motion.time)
-    assert count == min(FRAMES + 1, len(film.time))
+    assert count == min(FRAMES, len(film.time))
     np.testing.assert_allclose(clips[0].motion.pose, film.pose[:count], atol=1e-9)
 
 
@@ -51,3 +51,12 @@ def test_a_clip_that_starts_later_is_compared_from_its_first_frame() -> None:
     found = expected(start="0.4 s")
     assert found.lost == 0.0
     assert (found.rmse < 0.2).all(), found.rmse
+
+
+def test_a_frame_is_exposed_no_longer_than_it_lasts() -> None:
+    base = PlannedSetup("bare", VirtualRecording(), GRID["spacing_mm"])
+    tried = noise_planning.SetupOptions((), (), (100.0, 2000.0), (), ())
+    slow, quick = noise_planning.setup_combinations(base, tried)
+    assert slow.setup.sensor.exposure == VirtualRecording().sensor.exposure
+    assert quick.setup.sensor.exposure == 0.0005
+    assert [each.words["exposure_ms"] for each in (slow, quick)] == ["1", "0.5"]

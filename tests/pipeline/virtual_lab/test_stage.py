@@ -1,4 +1,5 @@
 import csv
+import logging
 from pathlib import Path
 
 import av
@@ -136,10 +137,14 @@ def test_a_number_that_none_can_have_is_refused(
         load_recording(path)
 
 
-def test_a_plan_tells_what_to_expect(files: Path, tmp_path: Path) -> None:
-    words = ["plan", "--response", str(files / "response.nc"), "--frames", "16", "--quiet"]
-    words += [str(recording(tmp_path)), "--codec", "ffv1", "h264:40"]
-    assert run_stage("film", [*words, "--csv", str(tmp_path / "plan.csv")]) == 0
+def test_a_plan_tells_what_to_expect(
+    files: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    words = ["plan", "--response", str(files / "response.nc"), "--frames", "16"]
+    words += [str(recording(tmp_path, specimen={})), "--codec", "ffv1", "h264:40"]
+    with caplog.at_level(logging.INFO):
+        assert run_stage("film", [*words, "--csv", str(tmp_path / "plan.csv")]) == 0
+    assert "virtual.specimen is left out" in caplog.text
     with (tmp_path / "plan.csv").open(encoding="utf-8") as file:
         lossless, coarse = csv.DictReader(file)
     assert lossless["codec"] == "ffv1"
