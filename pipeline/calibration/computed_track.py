@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipeline.calibration.experiments import TrackedSpecimen, per_dof, pose_specimen
+from pipeline.calibration.experiments import TrackedSpecimen, load_cell, per_dof, pose_specimen
 from pipeline.calibration.inputs import Constants, TrackedMotion
 from pipeline.posing import lattice_of, network_variables, spread, unit_coordinates
-from pipeline.runtime import UserError
 from pipeline.tracking.output import absent_flag, label_track
 from sim.core import Floats
 from sim.energy import observe
@@ -70,12 +69,8 @@ def _motion(posed: Scene, case: int, time: Floats) -> Floats:
 def _force(
     made: TrackedSpecimen, posed: Scene, asked: TrackedMotion, motion: Floats, folder: Path
 ) -> Floats:
-    """Computes the force (n_times,) of the drive along its direction, N."""
-    towards = made.towards(asked.case)
-    if towards is None:
-        what = "a drive by a time series does not tell the direction of a load cell"
-        remedy = "leave out load, or name a problem whose drive has directions"
-        raise UserError(what, file=folder / asked.problem, key="load", remedy=remedy)
+    """Computes the force (n_times,) of the drive along its direction at equilibria, N."""
+    towards = load_cell.check_load(made, asked.case, folder / asked.problem)
     values = concrete_parameters(posed, posed.lattice.vertices)
     seen = observe(posed.topology, values, motion)
     return np.asarray(seen.force_on(posed.loads.driven) @ towards[:2])

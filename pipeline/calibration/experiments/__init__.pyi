@@ -1,6 +1,7 @@
 from . import force_displacement as force_displacement
 from . import free_decay as free_decay
 from . import full_field as full_field
+from . import load_cell as load_cell
 from . import load_cycles as load_cycles
 from . import tracked_specimen as tracked_specimen
 from .experiment import Experiment as Experiment

@@ -41,13 +41,11 @@ class LoadCellReadings(NamedTuple):
         )
 
 
-def read_load(
-    asked: LoadCellOptions, made: TrackedSpecimen, case: int, track: xr.Dataset, path: Path
-) -> LoadCellReadings:
-    """Reads the load cell of a track.
+def check_load(made: TrackedSpecimen, case: int, path: Path) -> Floats:
+    """Returns the direction (3,) of a load cell whose readings can be computed.
 
     Raises:
-        UserError: there are none, or what they read is not known.
+        UserError: they cannot; it names `path`, and what they lack.
     """
     scene, towards = made.scene, made.towards(case)
     for wrong, what, remedy in (
@@ -66,15 +64,26 @@ def read_load(
             "a drive by a time series does not tell the direction of the cell",
             "leave out load, or name a problem whose drive has directions",
         ),
-        (
-            not np.isfinite(track["load_force"].values).any(),
-            "the track has no readings of a load cell",
-            "leave out load, or track the recording with its log of forces",
-        ),
     ):
         if wrong:
             raise UserError(what, file=path, key="load", remedy=remedy)
     assert towards is not None
+    return towards
+
+
+def read_load(
+    asked: LoadCellOptions, made: TrackedSpecimen, case: int, track: xr.Dataset, path: Path
+) -> LoadCellReadings:
+    """Reads the load cell of a track.
+
+    Raises:
+        UserError: there are none, or what they read is not known.
+    """
+    scene, towards = made.scene, check_load(made, case, path)
+    if not np.isfinite(track["load_force"].values).any():
+        what = "the track has no readings of a load cell"
+        remedy = "leave out load, or track the recording with its log of forces"
+        raise UserError(what, file=path, key="load", remedy=remedy)
     value = track["load_force"].values
     frame = np.flatnonzero(np.isfinite(value))
     return LoadCellReadings(

@@ -124,9 +124,13 @@ class Recording(Section):
         """Refuses what differs from the section `virtual`, which alone tells it there."""
         if self.virtual is None:
             return self
-        if self.readout:
-            what = "the virtual camera reads all rows at once"
-            raise fault(what, "leave it out beside virtual", "readout")
+        for key, what in (
+            ("readout", "the virtual camera reads all rows at once"),
+            ("sha256", "no video is there yet that it could be of"),
+            ("design", "what is rendered has the design that the command names"),
+        ):
+            if getattr(self, key):
+                raise fault(what, "leave it out beside virtual", key)
         camera, look = self.virtual.camera, self.virtual.look
         own = {
             "pixel_size": (camera.pixel_size, "camera.pixel_size"),

@@ -98,3 +98,13 @@ def test_loads_that_are_refused(
     assert failed == 2
     assert told in capsys.readouterr().err
     assert not (tmp_path / "found.nc").exists()
+
+
+def test_a_cell_in_a_motion_in_time_is_not_computed(tmp_path: Path, capsys: Output) -> None:
+    """Refuses a force that would lack the inertia of the grips."""
+    shutil.copy(SPECIMENS / "shaken.yaml", tmp_path)
+    each = track(problem="shaken.yaml", virtual=FAST, load=None)
+    path = specimens.written(tmp_path, specimens.described([each], WANTED, material=START))
+    words = ["synthesise", str(path), "--out-dir", str(tmp_path / "data"), "--quiet"]
+    assert run_stage("calibrate", words) == 2
+    assert "the inertia of the grips" in capsys.readouterr().err
