@@ -21,7 +21,6 @@ from sim.energy import observe
 from sim.quasistatics import StaticSolver
 from sim.scene import Scene, cases_of, drive_force, make_plan, simulate
 from sim.solvers import Measure, Solved, Solver, run_batch
-from sim.structure import MOST_ROUNDS
 
 STREAM = 1
 """First word of the seeds of all draws here, so that no other specimen equals one of them."""
@@ -55,11 +54,13 @@ def sample_specimens(
     scene = planned.alone(case) if held is None else drive_as_measured(planned, held)
     seeds = [(STREAM, asked.prediction.seed, number) for number in range(asked.prediction.samples)]
     made = [drawn(scene, vertices, asked.tolerances, seed) for seed in seeds]
-    unsound = f"units still overlap at rest after {MOST_ROUNDS} draws"
-    failures = [unsound for _, copy in made if not copy.sound]
+    failures = [copy.failure for copy in made if copy.failure is not None]
     solver = _solver(scene, vertices, times)
     cases = (
-        case for each, copy in made if copy.sound for case in cases_of(each, copy.vertices, solver)
+        case
+        for copy in made
+        if copy.failure is None
+        for case in cases_of(copy.scene, copy.vertices, solver)
     )
     courses, leading = [], planned.loads.cases[case].leading
     with cli.progress(len(made), "specimens", initial=len(failures)) as bar:

@@ -11,10 +11,11 @@ import xarray as xr
 
 from pipeline.problem.sections import Robustness, Tolerances
 from pipeline.runtime import cli
-from sim.core import Floats
+from sim.core import Floats, SimulationError
 from sim.energy import observe
 from sim.scene import (
     Scene,
+    at_rest,
     cases_of,
     drive_force,
     make_plan,
@@ -24,7 +25,7 @@ from sim.scene import (
     target_motion,
 )
 from sim.solvers import Measure, MotionLaw, Outcome, Solved, run_batch
-from sim.structure import MOST_ROUNDS, Perturbation, PerturbedStructure
+from sim.structure import MOST_ROUNDS, Perturbation
 from sim.structure import perturbed as perturbed_structure
 
 
@@ -33,6 +34,16 @@ class Noise(NamedTuple):
 
     name: str
     sizes: Perturbation
+
+
+class DrawnCopy(NamedTuple):
+    """Holds one copy of a structure as it rests, or why there is none."""
+
+    scene: Scene  # with its constants
+    vertices: Floats  # (n_vertices, 2) mm
+    clashes: int  # units that overlapped, or touched at rest, in the first draw
+    redrawn: int  # shifts that were drawn again
+    failure: str | None = None
 
 
 class PerturbedResponse(NamedTuple):
@@ -74,20 +85,29 @@ def noises(asked: Robustness, spacing: float) -> list[Noise]:
 
 def drawn(
     scene: Scene, vertices: Floats, asked: Tolerances | Perturbation, seed: Sequence[int]
-) -> tuple[Scene, PerturbedStructure]:
-    """Draws one copy of a structure: the scene with its constants, and its vertices.
+) -> DrawnCopy:
+    """Draws one copy of a structure, and lets it come to rest where its ligaments are bent.
 
-    `vertices` (n_vertices, 2) are the design's, mm; equal seeds give equal copies, whatever else is
-    drawn.
+    `vertices` (n_vertices, 2) are the design's as it rests, mm; equal seeds give equal copies,
+    whatever else is drawn.
     """
     sizes = _sizes(asked, scene.lattice.spacing) if isinstance(asked, Tolerances) else asked
     of = scene.structure
     copy = perturbed_structure(scene.lattice, vertices, of.material, sizes, of.contact, seed)
-    if sizes.assembly is None:
-        return scene.updated(material=copy.material), copy
-    # ligaments join the units where these were put, which breaks a symmetry
-    put = replace(scene.lattice, vertices=copy.vertices)
-    return scene.updated(material=copy.material, lattice=put, symmetry="none"), copy
+    made = scene.updated(material=copy.material)
+    if sizes.assembly is not None:
+        # ligaments join the units where these were put, which breaks a symmetry
+        put = replace(scene.lattice, vertices=copy.vertices)
+        made = made.updated(lattice=put, symmetry="none")
+    found = DrawnCopy(made, copy.vertices, copy.clashes, copy.redrawn)
+    if not copy.sound:
+        failure = f"units still overlap at rest after {MOST_ROUNDS} draws"
+        return found._replace(failure=failure)
+    try:
+        rest, there = at_rest(made, copy.vertices)
+    except SimulationError as error:
+        return found._replace(failure=f"the copy does not come to rest: {error}")
+    return found._replace(scene=rest, vertices=there)
 
 
 def _sizes(asked: Tolerances, spacing: float) -> Perturbation:
@@ -117,7 +137,7 @@ def simulate(
             copies = [drawn(scene, vertices, noise.sizes, seed) for seed in seeds]
             outcomes = _outcomes(scene, vertices, copies, target, threads)
             rows = []
-            for (_, copy), outcome in zip(copies, outcomes, strict=True):
+            for copy, outcome in zip(copies, outcomes, strict=True):
                 rows.append(_row(scene, copy, outcome))
                 bar.update(failed=sum(row["status"].item() != "ok" for row in rows))
             part = xr.concat(rows, dim=xr.DataArray(list(samples), dims="sample", name="sample"))
@@ -129,7 +149,7 @@ def simulate(
 def _outcomes(
     scene: Scene,
     vertices: Floats,
-    copies: Sequence[tuple[Scene, PerturbedStructure]],
+    copies: Sequence[DrawnCopy],
     target: Floats | None,
     threads: int,
 ) -> Iterator[list[Outcome[PerturbedResponse]]]:
@@ -137,14 +157,14 @@ def _outcomes(
     plan = make_plan(scene, vertices, sample_times(scene), every_case=True, gradient=False)
     cases = (
         case
-        for imperfect, copy in copies
-        if copy.sound
-        for case in cases_of(imperfect, copy.vertices, plan.solver)
+        for copy in copies
+        if copy.failure is None
+        for case in cases_of(copy.scene, copy.vertices, plan.solver)
     )
     n_cases = len(scene.loads.cases)
     done = run_batch(cases, _measure(scene, target), threads)
-    for _, copy in copies:
-        yield list(islice(done, n_cases)) if copy.sound else []
+    for copy in copies:
+        yield list(islice(done, n_cases)) if copy.failure is None else []
 
 
 def _measure(scene: Scene, target: Floats | None) -> Measure[PerturbedResponse]:
@@ -175,16 +195,13 @@ def _along(motion: MotionLaw) -> Floats:
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def _row(
-    scene: Scene, copy: PerturbedStructure, outcomes: list[Outcome[PerturbedResponse]]
-) -> xr.Dataset:
+def _row(scene: Scene, copy: DrawnCopy, outcomes: list[Outcome[PerturbedResponse]]) -> xr.Dataset:
     """Reduces one copy to the mean of its load cases, or to why there is none.
 
     How far it is from its target stays that of each: they differ in size.
     """
-    failure = next((outcome.failure for outcome in outcomes if outcome.failure is not None), None)
-    if not copy.sound:
-        failure = f"units still overlap at rest after {MOST_ROUNDS} draws"
+    every = [copy.failure, *(outcome.failure for outcome in outcomes)]
+    failure = next((each for each in every if each is not None), None)
     courses = [outcome.value for outcome in outcomes if outcome.value is not None]
     times = sample_times(scene)
 

@@ -11,10 +11,16 @@ from numpy.typing import NDArray
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
-from pipeline.posing import design_scene, loss_units, read_design, structures_of
+from pipeline.posing import (
+    design_scene,
+    designed_angles,
+    loss_units,
+    read_design,
+    structures_of,
+)
 from pipeline.problem import Problem
 from pipeline.runtime import UserError, cli
-from sim.scene import Scene, combined, make_plan, simulate
+from sim.scene import Scene, at_rest, combined, make_plan, simulate
 
 PLAIN = "plain"
 HELD_OUT = 16
@@ -115,7 +121,10 @@ def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
     scene = design_scene(asked, folder)
     vertices = scene.lattice.vertices
     if path is not None:
-        scene, vertices = structures_of(scene, read_design(asked, path))["cloaked"]
+        design = read_design(asked, path)
+        scene, vertices = structures_of(scene, design, straight=True)["cloaked"]
+        if (angles := designed_angles(design)) is not None:
+            scene = scene.bent(angles)
     copies = scene.design.copies
     if copies is None:
         return _of(scene, vertices)
@@ -131,5 +140,6 @@ def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
 
 
 def _of(scene: Scene, vertices: NDArray[np.float64]) -> float:
-    plan = make_plan(scene, vertices, gradient=False)
-    return float(simulate(scene, vertices=vertices, plan=plan).loss)
+    rest, there = at_rest(scene, vertices)
+    plan = make_plan(rest, there, gradient=False)
+    return float(simulate(rest, vertices=there, plan=plan).loss)

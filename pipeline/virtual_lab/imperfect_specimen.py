@@ -63,14 +63,15 @@ def make_specimen(
     """Draws a specimen of a structure under one of its load cases, whose motion ends at `end`, s.
 
     Raises:
-        UserError: its units would overlap.
+        UserError: its units would overlap, or it does not come to rest.
     """
-    scene, copy = drawn(*structure, asked, (STREAM, asked.seed))
-    if not copy.sound:
+    copy = drawn(*structure, asked, (STREAM, asked.seed))
+    if copy.failure is not None:
+        what = f"the specimen cannot be made: {copy.failure}"
         remedy = "give another seed, or smaller tolerances"
-        raise UserError("units of the specimen overlap", key="virtual.specimen", remedy=remedy)
-    made = scene.driven_by(
-        imperfect_drive(scene, case, asked.drive, end, asked.unload),
+        raise UserError(what, key="virtual.specimen", remedy=remedy)
+    made = copy.scene.driven_by(
+        imperfect_drive(copy.scene, case, asked.drive, end, asked.unload),
         duration=end,
         frequency=None,
         reference=None,

@@ -24,6 +24,7 @@ from .plan import sample_times as sample_times
 from .relaxation import AsBuilt as AsBuilt
 from .relaxation import Relaxed as Relaxed
 from .relaxation import as_built as as_built
+from .relaxation import at_rest as at_rest
 from .relaxation import relaxed as relaxed
 from .scene import DIRECTED as DIRECTED
 from .scene import DOFS as DOFS

@@ -46,6 +46,20 @@ def relaxed(scene: Scene, vertices: Floats | None = None) -> Relaxed:
     return Relaxed(_counted_from(scene, rest), np.asarray(rest.vertices), motion)
 
 
+def at_rest(scene: Scene, vertices: Floats) -> tuple[Scene, Floats]:
+    """Lets a structure come to rest if its ligaments are under stress, as scene and vertices.
+
+    One without stress is returned as it is; `vertices` (n_vertices, 2) are in mm.
+
+    Raises:
+        SimulationError: there is no equilibrium.
+    """
+    material = scene.structure.material
+    if not (np.any(material.end_angles) or np.any(material.elongation)):
+        return scene, vertices
+    return relaxed(scene, vertices)[:2]
+
+
 def _counted_from(scene: Scene, rest: RestState) -> Scene:
     """Replaces the lattice by the one at rest, and the natural state by what is left of it."""
     stretch, shear, bend = np.asarray(rest.natural).T
