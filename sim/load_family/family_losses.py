@@ -103,13 +103,19 @@ class LoadSetup:
         return largest._replace(frequency=top, rise=rise, delay=largest.delay * shorter)
 
     def posed(self, scene: Scene) -> Scene:
-        """Puts a scene, and its reference, under the supports and drives of the set-up."""
-        if self.scene is None:
-            return scene
-        made, other = replace(scene, loads=self.scene.loads), self.scene.objective.reference
-        if scene.objective.reference is None or other is None:
-            return made
-        return made.updated(reference=replace(scene.objective.reference, loads=other.loads))
+        """Puts a scene, and its reference, under the supports and drives of the set-up.
+
+        The region of interest is the set-up's too: what another drive moves is not to rest.
+        """
+        return scene if self.scene is None else _in_setup(scene, self.scene)
+
+
+def _in_setup(scene: Scene, setup: Scene) -> Scene:
+    """Takes loads and region from the scene of a set-up, for the reference as well."""
+    own, other = scene.objective.reference, setup.objective.reference
+    reference = _in_setup(own, other) if own and other else own
+    made = replace(scene, loads=setup.loads)
+    return made.updated(region=setup.objective.region, reference=reference)
 
 
 @dataclass(frozen=True)

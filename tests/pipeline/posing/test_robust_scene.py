@@ -12,6 +12,8 @@ from pipeline.__main__ import run_stage
 from pipeline.posing import design_scene, load_family, scene_of, under_worst
 from pipeline.problem.reading import load, overlay_keys
 from reports.__main__ import main
+from sim.load_family import LoadLosses
+from sim.scene import concrete_parameters, simulate
 from sim.solvers import Harmonic
 from tests.pipeline.conftest import Failing
 from tests.pipeline.samples import sample
@@ -110,19 +112,56 @@ def test_a_pulse_is_a_load_of_its_own(fig2: Path) -> None:
     assert largest == pytest.approx(4.5)
 
 
+def certificate(**load: float) -> xr.Dataset:
+    """Makes a certificate that has tried but one load."""
+    made = sample("certificate")
+    for part, value in load.items():
+        for kind in ("load", "found"):
+            made[f"{kind}_{part}"] = xr.full_like(made[f"{kind}_{part}"], value)
+    return made
+
+
 def test_a_response_is_to_the_load_that_was_certified(fig2: Path) -> None:
     file = fig2.parents[1] / "fig7/problem.yaml"
-    asked, worst = load(file, "unbiased"), sample("certificate")
+    asked = load(file, "unbiased")
     family = load_family(asked, file.parent)
     assert family is not None
     certified = family.setups[1].fastest(1)
     assert isinstance(certified, Harmonic)
-    at = {"direction": 0.0, "amplitude": 4.5, "frequency": 15.0, "setup": 1}
-    for part, value in at.items():
-        for kind in ("load", "found"):
-            worst[f"{kind}_{part}"] = xr.full_like(worst[f"{kind}_{part}"], value)
+    worst = certificate(direction=0.0, amplitude=4.5, frequency=15.0, setup=1)
     posed = scene_of(under_worst(asked, worst), file.parent)
     assert posed.loads.motions == (certified._replace(direction=0.0),)
+
+
+SETUPS = """
+void: { disc: { radius: 7 mm } }
+cloak: { disc: { radius: 22 mm } }
+objective:
+  kind: displacement
+  target: rest
+  loads:
+    directions: [90 deg, 270 deg]
+    setups:
+      - supports: [{ units: bottom }]
+        drive: { kind: linear_ramp, units: top, amplitude: 3 mm, duration: 1 s, direction: 270 deg }
+        directions: [180 deg, 360 deg]
+"""
+
+
+def test_what_another_setup_drives_is_not_to_rest(tmp_path: Path) -> None:
+    """Certifies a load of it by the loss that the response to it has."""
+    asked = load(write(tmp_path, SETUPS, size=5, amplitude=3.0))
+    family, scene = load_family(asked, tmp_path), scene_of(asked, tmp_path)
+    assert family is not None
+    posed = family.setups[1].posed(scene)
+    assert not np.isin(posed.loads.driven, posed.objective.region).any()
+    place, values = np.array([0.5, 0.0, 0.75]), concrete_parameters(scene, scene.lattice.vertices)
+    certified = LoadLosses(scene, family, lambda _: values).value(np.zeros(0), place)
+    assert family.numbers(place) == pytest.approx([1.5 * np.pi, 3.0])
+    worst = certificate(direction=270.0, amplitude=3.0, setup=1)
+    response = scene_of(under_worst(asked, worst), tmp_path)
+    loss = float(simulate(response, vertices=response.lattice.vertices).loss)
+    assert certified == pytest.approx(loss, rel=1e-9)
 
 
 OFF_CENTRE = {"disc": {"centre": ["30 mm", "58 mm"], "radius": "8 mm"}}
