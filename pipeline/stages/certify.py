@@ -1,7 +1,11 @@
-"""Stage: the losses of designs over a family of loads, random ones and the worst."""
+"""Stage: the losses of designs over a family of loads, random ones and the worst.
+
+They are losses of structures as designed, also where a design is optimised over imperfect copies.
+"""
 
 import argparse
 import hashlib
+import logging
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -19,6 +23,8 @@ from sim.load_family import LoadFamily, LoadLosses, ascend
 from sim.optimise import Journal
 from sim.scene import DIRECTED, Scene, concrete_parameters
 from sim.solvers import Together
+
+LOG = logging.getLogger(__name__)
 
 LOADS, SEARCHES = 1000, 50
 """Random loads, and searches of the worst one from random starts."""
@@ -58,6 +64,14 @@ def loads_in_ranges(asked: Problem, source: Path) -> LoadFamily:
         remedy = "add objective.loads, or name a preset that has it"
         what = "the problem asks for no loads in ranges"
         raise UserError(what, file=source, key="objective.loads", remedy=remedy)
+    robust = asked.objective.robust
+    if robust is not None and robust.copies:
+        LOG.warning(
+            "%s: losses here are of the structure as designed, not of the %d imperfect copies of"
+            " objective.robust.copies",
+            source,
+            robust.copies,
+        )
     return family
 
 

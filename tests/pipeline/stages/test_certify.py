@@ -225,6 +225,15 @@ def test_set_ups_have_loads_of_their_own(fig2: Path) -> None:
     np.testing.assert_allclose(middle, [[np.pi / 4, 11.25]])
 
 
+@pytest.mark.parametrize("copies", [0, 2])
+def test_copies_that_do_not_count_are_warned_of(
+    fig2: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture, copies: int
+) -> None:
+    path = write(fig2, tmp_path, objective={"robust": {"copies": copies}})
+    certify.loads_in_ranges(load(path), path)
+    assert ("not of the 2 imperfect copies" in caplog.text) == bool(copies)
+
+
 def test_searches_that_come_to_no_load_are_told(
     chosen: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
