@@ -75,7 +75,7 @@ def front(path: Path, designs: Mapping[str, Path], out: Path, threads: int) -> x
         for name, column in zip(FrontPoint._fields, zip(*rows, strict=True), strict=True)
     }
     made = xr.Dataset({"design": list(designs), **columns})
-    for name in ("nominal_loss", "worst_loss"):
+    for name in ("nominal_loss", "worst_loss", "altered_loss"):
         made[name].attrs["units"] = loss_units(problem.load(path))
     return made
 
@@ -109,7 +109,8 @@ def _point(
         parameter,
         str(settings[number - 1]),
         float(own @ scene.loads.case_weights),
-        float(worst[-1]),
+        # searches may have come to no load that can be simulated
+        float(worst[-1]) if np.isfinite(worst[-1]) else np.nan,
         float(np.rad2deg(direction)),
         float(amplitude),
         float(frequency[0]) if frequency else np.nan,

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline import datasets, problem
 from pipeline.datasets import chunked, provenance
-from pipeline.posing import perturbed, read_design, scene_of, structures_of
+from pipeline.posing import loss_units, perturbed, read_design, scene_of, structures_of
 from pipeline.runtime import UserError
 
 LOG = logging.getLogger(__name__)
@@ -27,6 +27,7 @@ def _run(args: argparse.Namespace) -> None:
     scene, vertices = structures_of(scene_of(asked, args.problem.parent), design)["cloaked"]
     samples = np.array_split(np.arange(asked.robustness.samples), args.chunks)[args.chunk]
     made = perturbed.simulate(scene, vertices, asked.robustness, list(samples), args.threads)
+    made["loss"].attrs["units"] = loss_units(asked)
     LOG.info("%d of %d copies failed", int((made["status"] != "ok").sum()), made["status"].size)
     parents = {"design": args.design}
     origin = provenance.of_study(asked, "monte_carlo", parents=parents)

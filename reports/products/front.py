@@ -119,6 +119,7 @@ def _panel(
 
 
 def _front(axes: Axes, series: xr.Dataset, certified: Mapping[str, xr.Dataset]) -> None:
+    series = series.dropna("design", subset=["nominal_loss", "worst_loss"])
     own, worst = series["nominal_loss"].values, series["worst_loss"].values
     axes.plot(own, worst, "-o", color=_WORST, ms=3.2, lw=0.8)
     for name in (name for name in _designs(series) if name in certified):
@@ -126,9 +127,10 @@ def _front(axes: Axes, series: xr.Dataset, certified: Mapping[str, xr.Dataset]) 
         place = float(series["nominal_loss"].sel(design=name)), greatest_loss(of)
         axes.plot(*place, "s", mfc="none", color=_WORST, ms=5.5, mew=0.8)
     places = np.stack([own, worst], axis=-1)
-    size = np.ptp(places, axis=0) + np.finfo(float).tiny
+    size = np.ptp([[0.0, 0.0]] if len(places) == 0 else places, axis=0) + np.finfo(float).tiny
     labelled: list[Floats] = []
-    for k in (0, len(places) - 1, *range(1, len(places) - 1)):  # the ends in any case
+    ends_first = sorted(range(len(places)), key=lambda k: 0 < k < len(places) - 1)
+    for k in ends_first:
         if all(np.abs((places[k] - other) / size).max() > _APART for other in labelled):
             share = str(series["setting"].values[k])
             style.note(axes, tuple(places[k]), share, (4, 1), ha="left", color=style.GREY)

@@ -1,5 +1,6 @@
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -7,7 +8,9 @@ from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.stages import certify, front
 from reports.__main__ import main
+from sim.core import SimulationError
 from sim.load_family import LoadLosses
+from tests.pipeline import unchanged
 from tests.pipeline.conftest import Failing
 from tests.pipeline.stages.test_certify import write
 from tests.pipeline.static import designed
@@ -70,6 +73,28 @@ def test_the_page_shows_the_certificates_of_the_ends(
     assert "Over the optimiser.symmetry" in text
     table = pd.read_csv(tmp_path / "front.csv")
     assert table["design"].tolist() == ["share.2", "symmetry.1"]
+
+
+def test_loads_that_all_fail_leave_gaps(
+    fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unsolvable(*_: object) -> None:
+        raise SimulationError("no equilibrium")
+
+    monkeypatch.setattr(front, "SPREAD", 2)
+    monkeypatch.setattr(front, "SEARCHES", 1)
+    energy = {"kind": "strain_energy", "target": "rest"}
+    path, out = write(fig2, tmp_path, presets=PRESETS, objective=energy), tmp_path / "front.nc"
+    file = unchanged.write(path, "share.1")
+    for name in ("value", "__call__"):
+        monkeypatch.setattr(LoadLosses, name, unsolvable)
+    words = ["--problem", str(path), "--quiet", "--out", str(out)]
+    assert run_stage("front", [*words, "--designs", f"share.1={file}"]) == 0
+    data = datasets.read(out, "front")
+    for name in ("nominal_loss", "worst_loss", "altered_loss"):
+        assert np.isnan(data[name]).all()
+        assert data[name].attrs["units"] == "N mm"
+    assert main(["front", *words[:3], "--front", str(out), "--out-dir", str(tmp_path)]) == 0
 
 
 def test_designs_are_those_of_presets_that_ask_for_several(

@@ -83,6 +83,14 @@ def test_a_problem_without_copies_is_told(folder: Path, tmp_path: Path, failing:
     assert "robustness" in failing("monte_carlo", ["run", "--problem", str(path), *words, *out])
 
 
+def test_strain_energies_have_their_unit(tmp_path: Path) -> None:
+    energy = static.HOLE.replace("displacement, target: intact", "strain_energy, target: rest")
+    path = static.write(tmp_path, energy + MORE, size=5, amplitude=3.0)
+    unchanged.write(path)
+    made = unchanged.chunk("monte_carlo", "scatter", tmp_path, tmp_path / "scatter.nc", (0, 4))
+    assert made["loss"].attrs["units"] == "N mm"
+
+
 def test_finer_load_steps_pass_the_same_states(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "verification.nc"
     words = ["--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")]
