@@ -1,4 +1,4 @@
-"""Stage: a design under finer steps of load or time, and other contact, beside those of the run."""
+"""Stage: a design under finer steps of load, or of time and other contact, beside those as run."""
 
 import argparse
 import logging
