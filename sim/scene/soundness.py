@@ -53,6 +53,10 @@ def check_scene(
     asked = np.array([0.0, scene.loads.duration]) if times is None else times
     check_units(scene.lattice, scene.lattice.vertices if vertices is None else vertices)
     _check_ids(scene)
+    margin = scene.objective.snap_margin
+    if margin is not None and not margin > 0.0:
+        what = f"a snap margin of {margin:g} bounds nothing; give one above zero, or None"
+        raise SceneError(what, "objective.snap_margin")
     found = [*_loose_units(scene), *_size(scene, asked)]
     for number, drive in enumerate(scene.loads.cases):
         if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(drive.motion)):

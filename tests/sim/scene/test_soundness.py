@@ -69,6 +69,8 @@ REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
         scene(cases=(sim.PrescribedMotion(LEFT, sim.LinearRamp(-1.0, 1.0), FORCES),)),
         "unit 0 is driven by .* along ux", "drive.units",
     ),
+    "no margin": (scene(snap_margin=0.0), "margin of 0 bounds nothing", "objective.snap_margin"),
+    "below 0": (scene(snap_margin=-0.1), "margin of -0.1", "objective.snap_margin"),
     "no such dof": (scene(supports=(sim.Clamp(LEFT, UNKNOWN),)), "no 'uz'; .*ux, uy", "supports"),
 }  # fmt: skip
 
