@@ -14,8 +14,15 @@ from pipeline.runtime import UserError
 def run_or_gather(
     args: argparse.Namespace, run: Callable[[argparse.Namespace], None], kind: Kind, dim: str
 ) -> None:
-    """Computes a part with ``run``, or joins all parts along ``dim``."""
+    """Computes a part with ``run``, or joins all parts along ``dim``.
+
+    Raises:
+        UserError: there is no such part, or parts do not belong together.
+    """
     if args.command == "run":
+        if not 0 <= args.chunk < args.chunks:
+            remedy = f"number the parts from zero; there are {args.chunks} (--chunks)"
+            raise UserError("there is no such part", key="--chunk", value=args.chunk, remedy=remedy)
         run(args)
     else:
         join_parts(args.parts, kind, dim, args.out)

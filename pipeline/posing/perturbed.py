@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
+from pipeline.posing.failures import StoppedError
 from pipeline.problem.sections import Robustness, Tolerances
 from pipeline.runtime import cli
 from sim.core import Floats, SimulationError
@@ -24,7 +25,7 @@ from sim.scene import (
     scales,
     target_motion,
 )
-from sim.solvers import Measure, MotionLaw, Outcome, Solved, run_batch
+from sim.solvers import Measure, MotionLaw, Outcome, Solved, Solver, run_batch
 from sim.structure import MOST_ROUNDS, Perturbation
 from sim.structure import perturbed as perturbed_structure
 
@@ -127,15 +128,26 @@ def simulate(
     """The dataset ``scatter`` of some of the copies, by their numbers, of a scene's shipped design.
 
     `vertices` (n_vertices, 2) are the design's, mm.
+
+    Raises:
+        StoppedError: the design itself, or what it is to mimic, cannot be simulated.
     """
-    target = None if scene.objective.reference is None else target_motion(scene, threads)
+    times = sample_times(scene)
+    try:
+        target = None if scene.objective.reference is None else target_motion(scene, threads)
+    except SimulationError as error:
+        raise StoppedError(error, scene, "intact", times) from error
+    try:
+        plan = make_plan(scene, vertices, times, every_case=True, gradient=False)
+    except SimulationError as error:
+        raise StoppedError(error, scene, "cloaked", times) from error
     parts = []
     listed = noises(asked, scene.lattice.spacing)
     with cli.progress(len(listed) * len(samples), "copies") as bar:
         for number, noise in enumerate(listed):
             seeds = [(asked.seed, number, sample) for sample in samples]
             copies = [drawn(scene, vertices, noise.sizes, seed) for seed in seeds]
-            outcomes = _outcomes(scene, vertices, copies, target, threads)
+            outcomes = _outcomes(scene, plan.solver, copies, target, threads)
             rows = []
             for copy, outcome in zip(copies, outcomes, strict=True):
                 rows.append(_row(scene, copy, outcome))
@@ -148,18 +160,17 @@ def simulate(
 
 def _outcomes(
     scene: Scene,
-    vertices: Floats,
+    solver: Solver,
     copies: Sequence[DrawnCopy],
     target: Floats | None,
     threads: int,
 ) -> Iterator[list[Outcome[PerturbedResponse]]]:
     """Outcomes of the load cases of every copy; none of a copy that cannot be made."""
-    plan = make_plan(scene, vertices, sample_times(scene), every_case=True, gradient=False)
     cases = (
         case
         for copy in copies
         if copy.failure is None
-        for case in cases_of(copy.scene, copy.vertices, plan.solver)
+        for case in cases_of(copy.scene, copy.vertices, solver)
     )
     n_cases = len(scene.loads.cases)
     done = run_batch(cases, _measure(scene, target), threads)

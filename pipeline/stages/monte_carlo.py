@@ -7,7 +7,14 @@ import numpy as np
 
 from pipeline import datasets, problem
 from pipeline.datasets import chunked, provenance
-from pipeline.posing import loss_units, perturbed, read_design, scene_of, structures_of
+from pipeline.posing import (
+    StoppedError,
+    loss_units,
+    perturbed,
+    read_design,
+    scene_of,
+    structures_of,
+)
 from pipeline.runtime import UserError
 
 LOG = logging.getLogger(__name__)
@@ -25,8 +32,16 @@ def _run(args: argparse.Namespace) -> None:
         raise UserError(what, file=args.problem, key="robustness", remedy="add robustness.samples")
     design = read_design(asked, args.design)
     scene, vertices = structures_of(scene_of(asked, args.problem.parent), design)["cloaked"]
-    samples = np.array_split(np.arange(asked.robustness.samples), args.chunks)[args.chunk]
-    made = perturbed.simulate(scene, vertices, asked.robustness, list(samples), args.threads)
+    count = asked.robustness.samples
+    if args.chunks > count:
+        what = f"there are no more parts than copies ({count})"
+        remedy = f"give {count} or less, or raise robustness.samples"
+        raise UserError(what, key="--chunks", value=args.chunks, remedy=remedy)
+    samples = np.array_split(np.arange(count), args.chunks)[args.chunk]
+    try:
+        made = perturbed.simulate(scene, vertices, asked.robustness, list(samples), args.threads)
+    except StoppedError as stopped:
+        raise stopped.explain(asked, args.problem) from stopped
     made["loss"].attrs["units"] = loss_units(asked)
     LOG.info("%d of %d copies failed", int((made["status"] != "ok").sum()), made["status"].size)
     parents = {"design": args.design}

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.posing import (
+    StoppedError,
     design_scene,
     designed_angles,
     loss_units,
@@ -20,7 +21,8 @@ from pipeline.posing import (
 )
 from pipeline.problem import Problem
 from pipeline.runtime import UserError, cli
-from sim.scene import Scene, at_rest, combined, make_plan, simulate
+from sim.core import SimulationError
+from sim.scene import Scene, at_rest, combined, make_plan, sample_times, simulate
 
 PLAIN = "plain"
 HELD_OUT = 16
@@ -67,12 +69,13 @@ def gains(path: Path, designs: Mapping[str, Path]) -> xr.Dataset:
     """The dataset ``gains`` of a problem file, from its own design and those of presets.
 
     Raises:
-        UserError: a preset asks for nothing but the study's own drive.
+        UserError: a preset asks for nothing but the study's own drive, or a structure cannot be
+            simulated.
     """
     own = problem.load(path)
     presets = [name for name in designs if name != PLAIN]
     with cli.progress(len(presets) + 1, "losses") as bar:
-        drive = _loss(own, path.parent, designs[PLAIN])
+        drive = _loss(own, path, designs[PLAIN])
         bar.update()
         rows = []
         for name in presets:
@@ -95,15 +98,15 @@ def _gain(path: Path, preset: str, designs: Mapping[str, Path]) -> Gain:
         what, remedy = "the preset asks for nothing but the study's own drive", "leave it out"
         raise UserError(what, file=path, value=preset, remedy=remedy)
     robust, held = asked.objective.robust, _held_out(asked)
-    plain, own = (_loss(held, path.parent, designs[name]) for name in (PLAIN, preset))
+    plain, own = (_loss(held, path, designs[name], preset) for name in (PLAIN, preset))
     return Gain(
         asks=asked.title,
         loads=1 + len(robust.loads if robust else ()),
         copies=HELD_OUT if robust and robust.copies else 0,
         loss_plain=plain,
         loss_own=own,
-        loss_altered=_loss(held, path.parent, None),
-        price=_loss(drive, path.parent, designs[preset]),
+        loss_altered=_loss(held, path, None, preset),
+        price=_loss(drive, path, designs[preset]),
     )
 
 
@@ -116,30 +119,49 @@ def _held_out(asked: Problem) -> Problem:
     return asked.model_copy(update={"objective": objective})
 
 
-def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
-    """The loss of a design, or of the structure before any; over the copies, if there are any."""
-    scene = design_scene(asked, folder)
-    vertices = scene.lattice.vertices
+def _loss(asked: Problem, source: Path, path: Path | None, preset: str = PLAIN) -> float:
+    """The loss of a design, or of the structure before any; over the copies, if there are any.
+
+    What is asked is that of a preset, or of the study itself.
+
+    Raises:
+        UserError: it cannot be simulated, or one of its copies cannot.
+    """
+    scene = design_scene(asked, source.parent)
+    name, vertices = f"altered ({preset})", scene.lattice.vertices
     if path is not None:
-        design = read_design(asked, path)
+        name, design = f"cloaked ({preset}, {path})", read_design(asked, path)
         scene, vertices = structures_of(scene, design, straight=True)["cloaked"]
         if (angles := designed_angles(design)) is not None:
             scene = scene.bent(angles)
+    try:
+        return _over_copies(scene, vertices, name)
+    except StoppedError as stopped:
+        raise stopped.explain(asked, source) from stopped
+
+
+def _over_copies(scene: Scene, vertices: NDArray[np.float64], name: str) -> float:
     copies = scene.design.copies
     if copies is None:
-        return _of(scene, vertices)
+        return _of(scene, vertices, name)
     losses = [
         _of(
             scene.updated(material=scene.structure.material.scaled(stiffness)),
             vertices + shifts[scene.lattice.group],
+            f"{name} (copy {number} of {len(copies)})",
         )
-        for shifts, stiffness in zip(copies.shifts, copies.stiffness, strict=True)
+        for number, (shifts, stiffness) in enumerate(
+            zip(copies.shifts, copies.stiffness, strict=True), start=1
+        )
     ]
     weights = np.full(len(losses), 1.0 / len(losses))
     return float(combined(np.array(losses), weights, scene.objective.copy_sharpness))
 
 
-def _of(scene: Scene, vertices: NDArray[np.float64]) -> float:
-    rest, there = at_rest(scene, vertices)
-    plan = make_plan(rest, there, gradient=False)
-    return float(simulate(rest, vertices=there, plan=plan).loss)
+def _of(scene: Scene, vertices: NDArray[np.float64], name: str) -> float:
+    try:
+        rest, there = at_rest(scene, vertices)
+        plan = make_plan(rest, there, gradient=False)
+        return float(simulate(rest, vertices=there, plan=plan).loss)
+    except SimulationError as error:
+        raise StoppedError(error, scene, name, sample_times(scene)) from error

@@ -22,6 +22,7 @@ from sim.core import Floats, SimulationError
 from sim.scene import Scene, evaluate, relaxed, simulate
 from sim.structure import Perturbation
 from tests.pipeline import static, unchanged
+from tests.tables import refused
 
 TURNING = (
     "cloak: { ring: { inner: 16 mm, outer: 25 mm } }\n"
@@ -108,6 +109,19 @@ def test_gains_are_of_the_copies_that_an_optimiser_sees(
     study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(robust_gains, "read_design", lambda *_: study.design)
-    found = robust_gains._loss(study.asked, study.folder, study.folder / "design.nc")
+    found = robust_gains._loss(study.asked, study.folder / "problem.yaml", study.folder)
     wanted, _ = evaluate(design_scene(study.asked, study.folder), study.vector)
     assert found == pytest.approx(wanted, rel=1e-6)
+
+
+def test_a_copy_that_cannot_be_simulated_is_told(
+    study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(*_: object, **__: object) -> None:
+        raise SimulationError("no equilibrium found", step=2)
+
+    monkeypatch.setattr(robust_gains, "simulate", failing)
+    source = study.folder / "problem.yaml"
+    what = "altered (robust) (copy 1 of 3) structure cannot be"
+    with refused(what, "drive.amplitude", file=source):
+        robust_gains._loss(study.asked, source, None, "robust")

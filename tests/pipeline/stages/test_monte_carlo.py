@@ -6,7 +6,7 @@ import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.__main__ import run_stage
-from pipeline.posing import scene_of
+from pipeline.posing import perturbed, scene_of
 from pipeline.posing.perturbed import noises, simulate
 from pipeline.stages import verify
 from sim.core import SimulationError
@@ -89,6 +89,33 @@ def test_strain_energies_have_their_unit(tmp_path: Path) -> None:
     unchanged.write(path)
     made = unchanged.chunk("monte_carlo", "scatter", tmp_path, tmp_path / "scatter.nc", (0, 4))
     assert made["loss"].attrs["units"] == "N mm"
+
+
+@pytest.mark.parametrize(
+    ("of", "key"), [(("0", "5"), "--chunks"), (("4", "4"), "--chunk"), (("-1", "4"), "--chunk")]
+)
+def test_parts_that_would_be_empty_are_refused(
+    folder: Path, tmp_path: Path, failing: Failing, of: tuple[str, str], key: str
+) -> None:
+    words = ["--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")]
+    words += ["--chunk", of[0], "--chunks", of[1], "--out", str(tmp_path / "scatter.nc")]
+    assert f"key:    {key}\n" in failing("monte_carlo", ["run", *words])
+
+
+@pytest.mark.parametrize(
+    ("name", "structure"), [("target_motion", "intact"), ("make_plan", "cloaked")]
+)
+def test_a_design_that_cannot_be_simulated_is_told(
+    folder: Path, tmp_path: Path, failing: Failing, monkeypatch: pytest.MonkeyPatch,
+    name: str, structure: str,
+) -> None:  # fmt: skip
+    def stopped(*_: object, **__: object) -> None:
+        raise SimulationError("no equilibrium found")
+
+    monkeypatch.setattr(perturbed, name, stopped)
+    words = ["--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")]
+    words += ["--chunk", "0", "--chunks", "4", "--out", str(tmp_path / "scatter.nc")]
+    assert f"the {structure} structure cannot be" in failing("monte_carlo", ["run", *words])
 
 
 def test_finer_load_steps_pass_the_same_states(folder: Path, tmp_path: Path) -> None:
