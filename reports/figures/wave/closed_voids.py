@@ -50,37 +50,7 @@ def _angle(start: Floats, end: Floats) -> Floats:
     return np.where(angle < -np.pi / 2, angle + 2 * np.pi, angle)
 
 
-def on_edges(structure: RigidUnits) -> Mask:
-    """Tells which ligaments (n_ligaments,) run along the top or the bottom row of a lattice."""
-    height = structure.site[structure.ligament_unit, 1]
-    ends = structure.site[:, 1].min(), structure.site[:, 1].max()
-    return np.asarray(np.isin(height, ends).all(axis=1) & (np.ptp(height, axis=1) == 0.0))
-
-
 def middles(structure: RigidUnits, vertices: Floats) -> Floats:
     """Finds the middles (n_ligaments, 2) of ligaments between vertices (n_units, n_vertices, 2)."""
     ends = vertices[structure.ligament_unit, structure.ligament_vertex]
     return np.asarray(ends.mean(axis=1))
-
-
-def along_edges(problem: Problem, response: xr.Dataset) -> xr.DataArray:
-    """Finds the smaller void angle (structure, case, time, ligament) along the edges."""
-    whole = from_dataset(response.isel(structure=0), problem.lattice.spacing)
-    n_edge = int(on_edges(whole).sum())
-    angles = np.full(
-        (*(response.sizes[dim] for dim in ("structure", "case", "time")), n_edge), np.nan
-    )
-    for k, name in enumerate(response["structure"].values):
-        part = response.sel(structure=name)
-        here = on_edges(from_dataset(part, problem.lattice.spacing))
-        for case in range(response.sizes["case"]):
-            found = smaller_angles(problem, part.isel(case=case))[:, here]
-            angles[k, case, :, : found.shape[1]] = found
-    dims = ("structure", "case", "time", "ligament")
-    known = ("structure", "direction", "time")
-    return xr.DataArray(angles, {name: response[name] for name in known}, dims)
-
-
-def edge_contacts(problem: Problem, response: xr.Dataset) -> xr.DataArray:
-    """Returns number (structure, case, time) of closed voids along the top and bottom edges."""
-    return (along_edges(problem, response) < problem.contact.cutoff_angle).sum("ligament")

@@ -16,7 +16,7 @@ from reports.figures.loading_path import (
     scene_facts,
     structures,
 )
-from reports.figures.wave.closed_voids import edge_contacts
+from reports.figures.wave.edge_contacts import edge_contacts
 from reports.figures.wave.monitored_places import places, relative_error
 from reports.study import StudyResults, display_name
 
@@ -87,7 +87,7 @@ def place_facts(study: StudyResults) -> Iterator[Fact]:
 
 
 def edge_facts(study: StudyResults) -> Iterator[Fact]:
-    """Yields closed voids along the top and bottom edges."""
+    """Yields contacts along the top and bottom edges."""
     counts = edge_contacts(study.problem, study.response).max("case")
     for name in structures(study.response):
         of_one = counts.sel(structure=name)

@@ -24,10 +24,10 @@ from reports.figures.loading_path import (
     structure_curves,
     structures,
 )
-from reports.figures.wave import closed_voids
+from reports.figures.wave import edge_contacts
 from reports.figures.wave.monitored_places import MonitoredUnit, first_structure, places
 from reports.panels import Panel, PanelFigure, measured_overlay
-from reports.study import StudyResults, deformed, from_dataset
+from reports.study import StudyResults
 
 CONTACT = "#e3342f"
 """Colour of marks: of contacts, and of places, as in the paper."""
@@ -51,7 +51,7 @@ def wave_figure(study: StudyResults) -> PanelFigure:
     panels = [
         *design_panels(study, _PROSE["a"], partial(_mark_places, study)),
         Panel(
-            ("c", "Response, true to scale; red dots: closed voids", 0.0, top),
+            ("c", "Response, true to scale; red dots: contacts", 0.0, top),
             lambda figure: snapshots(
                 figure, study, grid, top + grid.head, partial(_contacts, study)
             ),
@@ -65,7 +65,7 @@ def wave_figure(study: StudyResults) -> PanelFigure:
         ),
         Panel(("e", "Mimicking error", 0.0, low), error, _PROSE["e"]),
         Panel(
-            ("f", "Smallest void angle along the top and bottom edges", half, low),
+            ("f", edge_contacts.contact_measure(study.problem).title, half, low),
             lambda figure: _edges(
                 style.place(figure, half + 11.0, low + ROOM, half - 14.0, 27.0), study
             ),
@@ -91,12 +91,9 @@ def _mark(place: MonitoredUnit, size: float) -> dict[str, Any]:
 
 
 def _contacts(study: StudyResults, axes: Axes, row: SnapshotStructure, sample: int) -> None:
-    """Draws dots on the ligaments beside which a void is closed."""
+    """Draws dots where the structure is in contact."""
     part = row.part.isel(case=row.case)
-    structure = from_dataset(row.part, study.problem.lattice.spacing)
-    frame = part["displacement"].isel(time=sample).transpose("unit", "dof").values
-    touching = closed_voids.closed(study.problem, part.isel(time=[sample]))[0]
-    x, y = closed_voids.middles(structure, deformed(structure, frame))[touching].T
+    x, y = edge_contacts.contact_places(study.problem, part, sample).T
     axes.plot(x, y, ls="", marker="o", ms=2.4, mfc=CONTACT, mec="white", mew=0.3, zorder=8)
 
 
@@ -119,32 +116,35 @@ def _places(figure: Figure, study: StudyResults, top: float) -> None:
 
 
 def _edges(axes: Axes, study: StudyResults) -> None:
-    """Draws smallest void angle on the edges over time, and when that is contact."""
+    """Draws how near neighbours on the edges are over time, and when that is contact."""
     path = abscissa_of(study.problem, study.response)
-    path_axes(axes, path, "angle (°)")
-    angles = 180.0 / np.pi * closed_voids.along_edges(study.problem, study.response).min("ligament")
-    structure_curves(axes, study.problem, path, angles, structures(study.response))
-    contact = study.problem.contact
-    cutoff, barrier = np.degrees([contact.cutoff_angle, contact.barrier_angle])
-    axes.axhspan(barrier, cutoff, color=CONTACT, alpha=0.18, lw=0, zorder=1)
-    axes.set_ylim(barrier - 4.0, 1.1 * float(angles.max()))
+    measure = edge_contacts.contact_measure(study.problem)
+    path_axes(axes, path, measure.axis)
+    nearest = edge_contacts.along_edges(study.problem, study.response).min("ligament")
+    values = measure.shown * nearest
+    structure_curves(axes, study.problem, path, values, structures(study.response))
+    begins, end = measure.shown * measure.begins, measure.shown * measure.end
+    axes.axhspan(end, begins, color=CONTACT, alpha=0.18, lw=0, zorder=1)
+    top = 1.1 * float(values.max())
+    axes.set_ylim(end - 0.07 * (top - end), top)
     axes.text(
-        0.01, barrier + 0.5 * (cutoff - barrier), "contact", color=CONTACT, fontsize=style.SMALL,
+        0.01, end + 0.5 * (begins - end), "contact", color=CONTACT, fontsize=style.SMALL,
         va="center", transform=axes.get_yaxis_transform(),
     )  # fmt: skip
 
 
 def _over_time(study: StudyResults) -> Columns:
-    """Returns one row a sample: u_y where marked, mimicking error, void angles, energies."""
+    """Returns one row a sample: u_y where marked, mimicking error, edges, energies."""
     problem, response = study.problem, study.response
     rise = response["displacement"].sel(dof="uy")
+    edges = edge_contacts.along_edges(problem, response)
     series = {
         f"uy_{k + 1}_mm": rise.isel(unit=place.unit)
         for k, place in enumerate(places(problem, response))
     }
     series |= {
         "mimicking_error": measures.measure_of(problem).of(response),
-        "edge_void_angle_rad": closed_voids.along_edges(problem, response).min("ligament"),
+        edge_contacts.contact_measure(problem).column: edges.min("ligament"),
         "strain_energy_Nmm": response["strain_energy"],
         "contact_energy_Nmm": response["contact_energy"],
         "min_void_angle_rad": response["min_void_angle"],

@@ -2,12 +2,13 @@ import numpy as np
 import pytest
 
 from pipeline import problem
+from pipeline.posing import law_comparison
 from pipeline.runtime import ROOT
 from reports.figures import kinds
 from reports.figures.loading_path import measures
-from reports.figures.wave import closed_voids, facts
+from reports.figures.wave import closed_voids, edge_contacts, facts
 from reports.figures.wave.monitored_places import places, relative_error
-from reports.study import StudyResults, from_dataset
+from reports.study import StudyResults, deformed, from_dataset
 
 CUTOFF = np.deg2rad(-10.0)
 
@@ -38,9 +39,35 @@ def test_voids_close_by_turns_and_the_middle_of_an_edge_is_shown(smile: StudyRes
     assert found[k]
     assert closed_voids.smaller_angles(smile.problem, part)[0, k] == pytest.approx(CUTOFF - 1e-6)
     part = smile.response.sel(structure="altered")
-    assert closed_voids.on_edges(from_dataset(part, 15.0)).sum() == 2 * 14
+    assert edge_contacts.on_edges(from_dataset(part, 15.0)).sum() == 2 * 14
     (place,) = places(smile.problem, smile.response)
     assert place.name == "unit (7, 14)"
+
+
+def test_contacts_are_counted_by_the_law_that_the_study_runs_under(smile: StudyResults) -> None:
+    """Close voids on angles without a touch, and bring units near without a closed void."""
+    geometric = law_comparison.under(smile.problem, "geometric")
+    angle = law_comparison.under(smile.problem, "angle")
+    response = smile.response.sel(structure=["intact"]).isel(case=[0], time=[0]).copy(deep=True)
+    structure = from_dataset(response.sel(structure="intact"), 15.0)
+    k = int(np.flatnonzero(edge_contacts.on_edges(structure))[0])
+    a, b = structure.ligament_unit[k]
+    at_rest = edge_contacts.along_edges(geometric, response)
+    np.testing.assert_allclose(at_rest.min(), smile.problem.lattice.ligament_length, rtol=1e-9)
+    apart = structure.site[b] - structure.site[a]
+    near = apart / np.linalg.norm(apart) * (float(at_rest.min()) - 0.01)
+    moved = {"structure": 0, "case": 0, "time": 0, "unit": int(a)}
+    response["displacement"][moved | {"dof": slice(0, 2)}] = near
+    laws = (geometric, angle)
+    counted = [edge_contacts.edge_contacts(each, response).item() for each in laws]
+    assert counted == [1, 0]
+    part = response.sel(structure="intact").isel(case=0)
+    frame = part["displacement"].isel(time=0).transpose("unit", "dof").values
+    middle = closed_voids.middles(structure, deformed(structure, frame))[k]
+    places = edge_contacts.contact_places(geometric, part, 0)
+    np.testing.assert_allclose(places, [middle], atol=0.1)
+    assert edge_contacts.contact_places(angle, part, 0).size == 0
+    assert edge_contacts.contact_measure(geometric).column == "edge_distance_mm"
 
 
 def test_relative_error_by_hand(smile: StudyResults) -> None:
