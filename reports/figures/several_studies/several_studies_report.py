@@ -2,10 +2,11 @@
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from pipeline.problem import Problem
 from pipeline.problem.reading import JointFigure, joint_figure
 from pipeline.runtime import UserError
 from reports.base import Table, prose
@@ -18,6 +19,15 @@ from reports.panels import Animation, case_labels, structure_clip
 from reports.study import StudyResults, display_name, study_results
 
 _PROSE = prose(__file__)
+_SHARED: dict[str, Callable[[Problem], object]] = {
+    "lattice": lambda asked: asked.lattice,
+    "material": lambda asked: asked.material,
+    "supports": lambda asked: asked.supports,
+    "drive": lambda asked: asked.drive,
+    "objective.kind": lambda asked: asked.objective.kind,
+    "objective.target": lambda asked: asked.objective.target,
+}
+"""Keys of a problem by which studies on one page are alike, and their values."""
 
 
 def several_studies_report(
@@ -120,7 +130,25 @@ def load(figure: Path, asked: JointFigure, preset: str | None, results: Path) ->
             what = f"{each.name} is not driven by a ramp"
             remedy = "show studies along a load side by side"
             raise UserError(what, file=figure, key="studies", remedy=remedy)
+        refuse_unlike(each, found[0], figure)
     return found
+
+
+def refuse_unlike(study: StudyResults, first: StudyResults, figure: Path) -> None:
+    """Refuses a study whose intact structure, load or measure is not that of the first one.
+
+    Raises:
+        UserError: it is not.
+    """
+    for name, of in _SHARED.items():
+        if of(study.problem) != of(first.problem):
+            raise UserError(
+                f"{study.name} and {first.name} differ in what a page shows of the first alone",
+                file=figure,
+                key="studies",
+                value=name,
+                remedy=f"give both the same {name}, or show each on its own page",
+            )
 
 
 def report(args: argparse.Namespace) -> None:

@@ -5,17 +5,23 @@ from pathlib import Path
 
 import pytest
 
+from pipeline import problem
 from pipeline.problem.reading import JointFigure, joint_figure
 from pipeline.runtime import UserError
 from reports.__main__ import main
 from reports.base import style
 from reports.figures.several_studies import figure
-from reports.figures.several_studies.several_studies_report import load, several_studies_report
+from reports.figures.several_studies.several_studies_report import (
+    load,
+    refuse_unlike,
+    several_studies_report,
+)
 from reports.page import publish
 from reports.study import StudyResults
 from tests.reports import compressed_study, figure_assertions
-from tests.tables import cases, some
+from tests.tables import cases, refused, some
 
+UNLIKE = [("lattice", {"columns": 9}), ("drive", {"amplitude": 3.0}), ("objective", {"kind": "x"})]
 ASKED = JointFigure(title="Two voids", studies=("fig_smile", "fig_frown"))
 
 
@@ -80,6 +86,28 @@ def test_a_faulty_figure_is_told(tmp_path: Path, text: str, told: str) -> None:
     (tmp_path / "figure.yaml").write_text(text)
     with pytest.raises(UserError, match=told):
         joint_figure.load_joint_figure(tmp_path / "figure.yaml")
+
+
+@pytest.mark.parametrize(("key", "update"), UNLIKE)
+def test_an_unlike_study_is_refused(
+    pair: list[StudyResults], key: str, update: dict[str, object]
+) -> None:
+    first, second = pair
+    asked = second.problem
+    section = getattr(asked, key).model_copy(update=update)
+    other = dataclasses.replace(second, problem=asked.model_copy(update={key: section}))
+    refuse_unlike(second, first, Path("figure.yaml"))
+    with refused("fig_frown and fig_smile differ", "studies", key, Path("figure.yaml")):
+        refuse_unlike(other, first, Path("figure.yaml"))
+
+
+def test_the_committed_studies_are_alike(smile: StudyResults) -> None:
+    folder = Path(__file__).parents[3] / "experiments"
+    heart, shamrock = (
+        dataclasses.replace(smile, problem=problem.load(folder / name / "problem.yaml"))
+        for name in ("fig6_heart", "fig6_shamrock")
+    )
+    refuse_unlike(shamrock, heart, folder / "fig6/figure.yaml")
 
 
 def test_a_shaken_study_has_no_place_in_it(tmp_path: Path) -> None:
