@@ -8,6 +8,7 @@ from .report_scene import cycles as cycles
 from .rigid_units import CLAMPED as CLAMPED
 from .rigid_units import CLOAK as CLOAK
 from .rigid_units import DRIVEN as DRIVEN
+from .rigid_units import FREE as FREE
 from .rigid_units import INCLUSION as INCLUSION
 from .rigid_units import SOURCE as SOURCE
 from .rigid_units import SURROUNDINGS as SURROUNDINGS

@@ -17,6 +17,7 @@ from pipeline.problem.sections import (
     RampHarmonicDrive,
     Region,
     resolve_centre,
+    single_drives,
 )
 from reports.facts import (
     Fact,
@@ -31,6 +32,7 @@ from reports.facts import (
 )
 from reports.figures.loading_path import contact_comparison, measured, measures, monte_carlo
 from reports.figures.loading_path.abscissa import (
+    LOADS,
     Abscissa,
     abscissa_of,
     driven_side,
@@ -144,7 +146,12 @@ def _load_fact(path: Abscissa) -> Fact:
 
 
 def strain_facts(problem: Problem, path: Abscissa) -> Iterator[Fact]:
-    """Yields the strain along the line from the middle to the driven side, a row for each kind."""
+    """Yields the strain along the line from the middle to the driven side, a row for each kind.
+
+    There is none of several drives that displace: the others' sides move as well.
+    """
+    if sum(drive.kind not in LOADS for drive in single_drives(problem.drive)) > 1:
+        return
     _, axis = driven_side(problem)
     span = float(np.ptp([site[1 + axis] for site in problem.lattice.sites()]))
     angles = np.degrees(getattr(problem.drive, "directions", ()) or (np.pi,))
@@ -267,7 +274,7 @@ def _turns(loads: Floats) -> Floats:
 
 def contraction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     """Yields change of the vertical distance between top and bottom rows."""
-    if not path.static:
+    if not path.static or not measures.contracts_freely(study.problem, study.response):
         return
     every = over_cases(study.problem, measures.contraction(study.problem, study.response))
     nearer, count = every.isel(time=-1), len(middle_units(study.problem, "top"))

@@ -119,7 +119,8 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
     way = [Table("path.csv", "every structure along the path", tables.path(study))]
     words = f"{measure.label}{measure.formula}{marks([study])}."
     yield measure.label, lambda axes: curves.measure_panel(axes, study, path, measure), words, way
-    if path.static and problem.objective.target != "rest":
+    lateral = path.static and measures.contracts_freely(problem, study.response)
+    if lateral and problem.objective.target != "rest":
         panel = curves.contraction_panel
         words = _PROSE["contraction"]
         yield "Lateral contraction", lambda axes: panel(axes, study, path), words, ()

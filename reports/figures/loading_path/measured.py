@@ -106,7 +106,7 @@ def measured_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
         recorded = [each for each in study.recordings if each.case == case]
         under: Under = ("", "") if len(cases) == 1 else (f"_case{case}", f", {names[case]}")
         yield from _measure_facts(study, recorded, path, measure, under)
-        if path.static:
+        if path.static and measures.contracts_freely(study.problem, study.response):
             yield from _contraction_facts(study, recorded, path, under)
 
 

@@ -8,6 +8,7 @@ import xarray as xr
 
 from pipeline.comparison import middle_units
 from pipeline.problem import Problem
+from reports.study import FREE
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,12 @@ def contraction(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     top, bottom = (middle_units(problem, side) for side in ("top", "bottom"))
     rise = response["displacement"].sel(dof="uy")
     return rise.sel(unit=bottom).mean("unit") - rise.sel(unit=top).mean("unit")
+
+
+def contracts_freely(problem: Problem, response: xr.Dataset) -> bool:
+    """Tests if what brings these units nearer is lateral: none of them is driven or clamped."""
+    units = [unit for side in ("top", "bottom") for unit in middle_units(problem, side)]
+    return bool((response["support"].sel(unit=units) == FREE).all())
 
 
 def reaction_error(force: xr.DataArray) -> xr.DataArray:

@@ -50,9 +50,10 @@ def path(study: StudyResults) -> Columns:
     if way.static:
         columns[way.column] = way.values
     answer = drive_response(problem)
-    series = {
-        headed(measure.key, measure.unit): measure.of(response),
-        "contraction_mm": measures.contraction(problem, response),
+    series = {headed(measure.key, measure.unit): measure.of(response)}
+    if measures.contracts_freely(problem, response):
+        series["contraction_mm"] = measures.contraction(problem, response)
+    series |= {
         headed(answer.key, answer.unit): answer.of(response),
         "strain_energy_Nmm": response["strain_energy"],
         "contact_energy_Nmm": response["contact_energy"],

@@ -23,7 +23,7 @@ PER_BAND = 2
 """Studies beside one another, each with its altered and its cloaked structure."""
 
 LEFT, BAR, GAP = 4.0, 15.0, 1.0
-CURVES = 46.0
+CURVES, PER_ROW = 46.0, 4
 TALLEST = 110.0
 """Height in mm that all bands of structures may take."""
 
@@ -34,7 +34,7 @@ def several_studies_figure(studies: Sequence[StudyResults]) -> PanelFigure:
     side = (style.TWO_COLUMNS - LEFT - BAR) / (1 + 2 * min(PER_BAND, len(studies)))
     side = min(side, TALLEST / (2 * len(bands)))
     tall = 11.0 + 2 * side + 4.0
-    rows = -(-2 * len(studies) // 4)
+    n_curves = sum(len(_curve_titles(study)) for study in studies)
     shades = [shade_of(study.problem, study.response) for study in studies]
     shade = max(shades, key=lambda shade: shade.field.limits[1])  # one range of colours for all
     letters = map(style.numbered_letter, count())
@@ -43,10 +43,12 @@ def several_studies_figure(studies: Sequence[StudyResults]) -> PanelFigure:
         for k, band in enumerate(bands)
         for panel in _band(band, shade, (k * tall, side), letters)
     ]
-    for k, study in enumerate(studies):
-        panels += _curves(study, k, len(bands) * tall, letters)
+    places = count()
+    for study in studies:
+        panels += _curves(study, places, len(bands) * tall, letters)
     draft = [reason for study in studies for reason in study.draft]
-    return PanelFigure(len(bands) * tall + rows * CURVES + 1.0, panels, draft)
+    height = len(bands) * tall + -(-n_curves // PER_ROW) * CURVES + 1.0
+    return PanelFigure(height, panels, draft)
 
 
 def _band(
@@ -96,14 +98,24 @@ def heading(study: StudyResults) -> str:
     return study.name.rpartition("_")[2].capitalize()
 
 
-def _curves(study: StudyResults, k: int, top: float, letters: Iterator[str]) -> Iterator[Panel]:
-    """Yields measure and contraction of the k-th study, in rows of four panels."""
-    way, measure = abscissa_of(study.problem, study.response), measures.measure_of(study.problem)
-    width, y = style.TWO_COLUMNS / 4, top + (2 * k // 4) * CURVES
-    for half, title in enumerate((measure.label, "contraction")):
-        left = ((2 * k + half) % 4) * width
+def _curve_titles(study: StudyResults) -> tuple[str, ...]:
+    """Names the curves of a study: its measure, and the contraction where that is lateral."""
+    title = measures.measure_of(study.problem).label
+    lateral = measures.contracts_freely(study.problem, study.response)
+    return (title, "contraction") if lateral else (title,)
 
-        def draw(figure: Figure, left: float = left, half: int = half) -> None:
+
+def _curves(
+    study: StudyResults, places: Iterator[int], top: float, letters: Iterator[str]
+) -> Iterator[Panel]:
+    """Yields measure and contraction of a study, at the next places in rows of four panels."""
+    way, measure = abscissa_of(study.problem, study.response), measures.measure_of(study.problem)
+    width = style.TWO_COLUMNS / PER_ROW
+    for half, title in enumerate(_curve_titles(study)):
+        row, column = divmod(next(places), PER_ROW)
+        left, y = column * width, top + row * CURVES
+
+        def draw(figure: Figure, left: float = left, y: float = y, half: int = half) -> None:
             axes = style.place(figure, left + 10.5, y + 11.5, width - 14.0, 25.0)
             if half == 0:
                 curves.measure_panel(axes, study, way, measure)

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from pipeline import problem
 from pipeline.problem import Output
 from pipeline.problem.fields import SIM_UNITS
+from pipeline.problem.sections import SeveralDrives
 from pipeline.problem.sections.drives import RotationDrive
 from reports.base import style
 from reports.facts import Fact
@@ -105,6 +106,13 @@ def test_a_drive_of_the_right_edge_is_named(degrees: tuple[float, ...], labels: 
     found = list(facts.strain_facts(asked.model_copy(update={"drive": drive}), PATH))
     assert [fact.label for fact in found] == labels
     assert [fact.value for fact in found] == pytest.approx([100 * 15.0 / 210.0] * len(found))
+
+
+def test_two_sides_that_are_pressed_have_no_strain_by_one() -> None:
+    asked = problem.load(FIG4)
+    other = asked.drive.model_copy(update={"units": "left", "directions": (0.0,)})
+    both = SeveralDrives.model_construct(kind="several", drives=(asked.drive, other))
+    assert not list(facts.strain_facts(asked.model_copy(update={"drive": both}), PATH))
 
 
 def test_curves_of_many_cases_stay_on_their_panel(two: StudyResults) -> None:

@@ -19,16 +19,25 @@ from reports.base import style
 from reports.facts import checks, fact_records, loss_formula
 from reports.facts.copies import spreads
 from reports.figures import kinds
-from reports.figures.loading_path import abscissa, curves, figure, measured, measures, monte_carlo
+from reports.figures.loading_path import (
+    abscissa,
+    curves,
+    figure,
+    measured,
+    measures,
+    monte_carlo,
+    tables,
+)
 from reports.figures.loading_path import facts as path_facts
 from reports.figures.loading_path.drive_response import drive_response
 from reports.figures.loading_path.structure_panels import rest_panel
 from reports.figures.robust_table import robust_table
+from reports.figures.several_studies.figure import several_studies_figure
 from reports.figures.shielding import facts as shielding
 from reports.figures.study_report import as_built_facts, study_report
 from reports.page import publish
 from reports.panels import payload
-from reports.study import StudyResults
+from reports.study import CLAMPED, DRIVEN, StudyResults
 from tests.reports import compressed_study, figure_assertions, recorded_study
 from tests.tables import refused, some
 
@@ -97,6 +106,21 @@ def test_contraction_of_middle_columns_and_force_on_units(smile: StudyResults) -
     forces = drive_response(smile.problem).of(smile.response).isel(case=0)
     np.testing.assert_allclose(forces.isel(time=-1), list(compressed_study.FORCE.values()))
     np.testing.assert_allclose(forces.isel(time=0), 0.0)
+
+
+@pytest.mark.parametrize("support", [CLAMPED, DRIVEN])
+def test_rows_that_are_held_have_no_lateral_contraction(smile: StudyResults, support: int) -> None:
+    """Press the lattice from the top: how much nearer the rows come is the drive's displacement."""
+    held = smile.response.copy(deep=True)
+    held["support"].loc[{"unit": middle_units(smile.problem, "top")}] = support
+    pressed = dataclasses.replace(smile, datasets={**smile.datasets, "response": held})
+    for study, there in ((smile, True), (pressed, False)):
+        whole, joint = figure.loading_path_figure(study), several_studies_figure([study])
+        path = abscissa.abscissa_of(study.problem, study.response)
+        assert ("Lateral contraction" in {panel.head[1] for panel in whole.panels}) == there
+        assert bool(list(path_facts.contraction_facts(study, path))) == there
+        assert ("cloaked_contraction_mm" in tables.path(study)) == there
+        assert any("contraction" in panel.head[1] for panel in joint.panels) == there
 
 
 def test_a_loss_has_its_formula(
