@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.problem import Problem
-from pipeline.problem.sections import HarmonicDrive, Quads, RampHarmonicDrive, resolve_centre
+from pipeline.problem.sections import HarmonicDrive, Quads, RampHarmonicDrive, Sweep, resolve_centre
 from reports.facts import Fact
 from reports.figures import loading_path, shielding, wave
 from reports.figures.shielding import MAPPED
@@ -61,12 +61,18 @@ def kind_of(problem: Problem) -> ReportKind:
 
     That of shielding is of squares with a round cloak in their middle.
     """
-    shaken, sweep = isinstance(problem.drive, HarmonicDrive | RampHarmonicDrive), problem.sweep
-    mapped = sweep is not None and sweep.grid is not None and set(sweep.keys) == {*MAPPED}
-    if shaken and mapped and _is_central(problem):
+    shaken = isinstance(problem.drive, HarmonicDrive | RampHarmonicDrive)
+    if shaken and _is_mapped(problem.sweep) and _is_central(problem):
         return SHIELDING
     mimics = problem.objective.kind == "displacement" and problem.objective.target == "intact"
     return WAVE if mimics and not problem.static else LOADING_PATH
+
+
+def _is_mapped(sweep: Sweep | None) -> bool:
+    """Tells a sweep over several directions and several frequencies."""
+    if sweep is None or sweep.grid is None or set(sweep.keys) != {*MAPPED}:
+        return False
+    return min(map(len, sweep.values.values())) > 1
 
 
 def _is_central(problem: Problem) -> bool:

@@ -94,10 +94,15 @@ def map_panel(figure: Figure, axes: Axes, bar: Axes, scene: ReportScene, sweep: 
     """Draws panel (e): loss over loading angle and frequency, stars at the loads designed for."""
     loss = sweep["loss"].transpose("frequency", "direction")
     angle, rate = sweep["direction"].values, sweep["frequency"].values
-    top = float(loss.max())
-    levels = MaxNLocator(9, steps=[1, 2, 2.5, 5, 10]).tick_values(float(loss.min()), top)
-    filled = axes.contourf(angle, rate, loss.values, levels, cmap=style.MAGNITUDE)
-    axes.contour(angle, rate, loss.values, levels, colors="white", linewidths=0.35)
+    if np.isfinite(loss).any():
+        low, high = float(loss.min()), float(loss.max())
+        levels = MaxNLocator(9, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+        filled = axes.contourf(angle, rate, loss.values, levels, cmap=style.MAGNITUDE)
+        axes.contour(angle, rate, loss.values, levels, colors="white", linewidths=0.35)
+        figure.colorbar(filled, cax=bar).set_label(loss_label(sweep["loss"]), labelpad=2.0)
+        bar.tick_params(length=1.5)
+    else:
+        bar.set_axis_off()
     failed = np.argwhere((sweep["status"].transpose("frequency", "direction") != "ok").values)
     axes.plot(angle[failed[:, 1]], rate[failed[:, 0]], "x", color=style.INTACT, ms=3, mew=0.7)
     loads = np.array(scene.directions)
@@ -109,5 +114,3 @@ def map_panel(figure: Figure, axes: Axes, bar: Axes, scene: ReportScene, sweep: 
     axes.xaxis.set_major_locator(FixedLocator(list(np.arange(0, angle.max() + 1, 45))))
     axes.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
     axes.spines[["top", "right"]].set_visible(True)
-    figure.colorbar(filled, cax=bar).set_label(loss_label(sweep["loss"]), labelpad=2.0)
-    bar.tick_params(length=1.5)

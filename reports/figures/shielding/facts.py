@@ -52,10 +52,10 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
     """Returns all facts of Figure 2, under headings."""
     scene, design, response = study.scene, study.design, study.response
     return [
-        *grouped("Scene", scene_facts(scene, design)),
+        *grouped("Scene", scene_facts(study)),
         *grouped("Shielding", loss_facts(study)),
         *grouped("Optimisation", history_facts(design)),
-        *grouped("Shape", shape_facts(scene, design)),
+        *grouped("Shape", shape_facts(study)),
         *grouped("Motion of the middle unit of the top edge", motion_facts(scene, response)),
         *grouped("Measured motion of the same unit", recorded_facts(study)),
         *recording_facts.recorded_facts(study.recordings),
@@ -70,8 +70,9 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
     ]
 
 
-def scene_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
+def scene_facts(study: StudyResults) -> Iterator[Fact]:
     """Yields the problem as it was run."""
+    scene, design = study.scene, study.design
     initial = from_dataset(design, scene.spacing, "vertices_initial")
     yield _told("units", initial.n_units, f"{scene.columns} × {scene.rows}")
     yield _told("spacing", scene.spacing)
@@ -84,7 +85,8 @@ def scene_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
     radius = scene.radii[-1]
     words = f"{worded(radius, 'mm', 4)} = {radius / scene.spacing:g} spacings"
     reach = measures.site_radius(initial, scene.middle, CLOAK) / scene.spacing
-    yield _told("radius", radius, words, reach=reach)
+    of_paper = "4.5 is the authors' code, 4 their text; " if _is_papers(study) else ""
+    yield _told("radius", radius, words, reach=reach, of_paper=of_paper)
     yield _told("horizon", scene.horizon, cycles=scene.horizon * scene.frequency)
 
 
@@ -97,10 +99,17 @@ def loss_facts(study: StudyResults) -> Iterator[Fact]:
     start, end = mean_losses(scene, response)
     loss, of = response["loss"], {"formula": loss_formula(study.problem), "until": scene.horizon}
     yield _loss("loss_start", start, loss, **of)
+    inferred = "; the paper's is inferred from its 70 %, (1 − 0.7)² of ours at the start"
+    of["of_paper"] = inferred if _is_papers(study) else ""
     yield _loss("loss_end", end, loss, **of, quoted=paper_loss(start))
     for key, name in (("start", "altered"), ("end", "cloaked")):
         value = mean_loss(scene, response, "loss_samples", name)
         yield _loss("loss_samples_{key}", value, loss, key=key, name=name)
+
+
+def _is_papers(study: StudyResults) -> bool:
+    """Tests if a study follows a publication, with which its facts compare it."""
+    return study.problem.report.paper is not None
 
 
 def _loss(key: str, value: float, of: xr.DataArray, /, **words: object) -> Fact:
@@ -138,13 +147,16 @@ def history_facts(design: xr.Dataset) -> Iterator[Fact]:
         yield _told("kkt_{method}", float(history["kkt_residual"]), **of)
 
 
-def shape_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
+def shape_facts(study: StudyResults) -> Iterator[Fact]:
     """Yields four-fold symmetry and porosity of the design."""
+    scene, design = study.scene, study.design
     structure = from_dataset(design, scene.spacing)
     initial = from_dataset(design, scene.spacing, "vertices_initial")
     distances = measures.asymmetry(structure, scene.middle)
     largest = worded(float(distances.max()), "mm", 2)
-    imposed = "imposed here, not in the paper" if scene.symmetry == "C4" else "not imposed"
+    imposed = "imposed" if scene.symmetry == "C4" else "not imposed"
+    if imposed == "imposed" and _is_papers(study):
+        imposed = "imposed here, not in the paper"
     rms = float(np.sqrt(np.mean(distances**2)))
     yield _told("asymmetry", rms, largest=largest, imposed=imposed)
     inner, outer = (scene.radii[-1] + side * 0.5 * scene.spacing for side in (-1.0, 1.0))
@@ -212,7 +224,11 @@ def _take(number: int) -> dict[str, str]:
 
 
 def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:
-    """Extremes of the robustness map."""
+    """Extremes of the robustness map, as far as it has results."""
+    failed = sweep["status"] != "ok"
+    yield _told("map_failed", int(failed.sum()), count=failed.size)
+    if failed.all():
+        return
     loss, ratio = sweep["loss"], sweep["loss"] / sweep["loss_altered"]
     worst = loss.where(loss == loss.max(), drop=True)
     angle, rate = float(worst["direction"][0]), float(worst["frequency"][0])
@@ -228,7 +244,6 @@ def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:
         yield _told(key, len(values), words, count=len(values))
         for end, edge in (("least", values.min()), ("most", values.max())):
             yield _told(f"{key}_{{end}}", float(edge), end=end)
-    yield _told("map_failed", int((sweep["status"] != "ok").sum()), count=loss.size)
 
 
 def check_facts(design: xr.Dataset, response: xr.Dataset) -> Iterator[Fact]:

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from reports.base import Table, prose, style
 from reports.facts import Columns, Fact, headed, history, measures, vertices
+from reports.figures.loading_path import credit
 from reports.figures.shielding.curves import loss_panel, map_panel, motion_panel
 from reports.figures.shielding.facts import MONITORED, monitored_recordings
 from reports.figures.shielding.structure_panels import (
@@ -50,7 +51,7 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
     simulated = simulated_rows(scene, response)
     names = [row.name for row in simulated]
     recordings = monitored_recordings(study)
-    recorded = recorded_rows(scene, response, recordings)
+    recorded = recorded_rows(scene, response, recordings, simulated[0].time)
     rows = sorted([*recorded, *simulated], key=lambda row: names.index(row.name))
     height = min(SNAPSHOT * len(rows), TALLEST_SNAPSHOTS)
     top = 51.5
@@ -59,7 +60,8 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
     load = f"$α$ = {direction:g}°"
     quoted = study.problem.report.paper is not None
 
-    most = f"Robustness, largest $J$ = {float(sweep['loss'].max()):.3g}"
+    most = float(sweep["loss"].max())
+    told = f"largest $J$ = {most:.3g}" if np.isfinite(most) else "no results"
 
     def loss(figure: Figure) -> None:
         loss_panel(style.place(figure, 133.5, 8.5, 43.5, 31.5), design, quoted)
@@ -99,7 +101,7 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
             [Table("top_edge.csv", middle, _top_edge(scene, response))],
         ),
         Panel(
-            ("e", most, 109.0, low),
+            ("e", f"Robustness, {told}", 109.0, low),
             losses,
             _PROSE["e"],
             [Table("robustness.csv", over, _map(sweep))],
@@ -115,7 +117,7 @@ def shielding_text(study: StudyResults, caption: str, facts: Sequence[Fact]) -> 
         study,
         caption,
         facts,
-        credit=_PROSE["credit"],
+        credit=credit(study.problem.report.paper),
         headline=("mean_reduction", "loss_end", "loss_copies", "peak_to_peak_reduction", "map_max"),
         note="The dot marks the unit of panel d.",
     )

@@ -115,17 +115,16 @@ def simulated_rows(scene: ReportScene, response: xr.Dataset) -> list[SnapshotRow
 
 
 def recorded_rows(
-    scene: ReportScene, response: xr.Dataset, recordings: Sequence[RecordedMotion]
+    scene: ReportScene, response: xr.Dataset, recordings: Sequence[RecordedMotion], times: Floats
 ) -> list[SnapshotRow]:
-    """Returns the recordings at the same times."""
-    wanted = snapshot_times(scene, response)
+    """Finds snapshots of the recordings at given times, s."""
     return [
         SnapshotRow(
             each.structure,
             each.source,
             from_dataset(response.sel(structure=each.structure), scene.spacing),
-            wanted,
-            each.at(each.data["measured"], wanted),
+            times,
+            each.at(each.data["measured"], times),
         )
         for each in recordings
     ]

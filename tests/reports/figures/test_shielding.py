@@ -2,12 +2,16 @@ import dataclasses
 
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib.figure import Figure
 
+from pipeline.problem.sections import DIRECTIONS
 from reports.base import style
+from reports.facts import fact_records
+from reports.figures import kinds
 from reports.figures.shielding import facts, figure
-from reports.figures.shielding.structure_panels import simulated_rows
-from reports.study import StudyResults
+from reports.figures.shielding.structure_panels import recorded_rows, simulated_rows, snapshot_times
+from reports.study import RecordedMotion, StudyResults
 from tests.reports import figure_assertions
 from tests.reports.figure_assertions import texts
 
@@ -113,3 +117,56 @@ def test_failed_points_of_the_map_are_crossed_out(study: StudyResults) -> None:
     made = drawn(dataclasses.replace(study, datasets=study.datasets | {"sweep": sweep}))
     crosses = [line for axes in made.axes for line in axes.lines if line.get_marker() == "x"]
     np.testing.assert_allclose(np.asarray(crosses[0].get_xydata()), [[45.0, 6.0]])
+
+
+def test_a_map_without_any_result_says_so(study: StudyResults) -> None:
+    sweep = study.sweep.copy(deep=True)
+    for name in ("loss", "loss_altered"):
+        sweep[name][:] = np.nan
+    sweep["status"] = sweep["status"].astype(object)
+    sweep["status"][:] = "no convergence at t = 0.1 s"
+    failed = dataclasses.replace(study, datasets=study.datasets | {"sweep": sweep})
+    assert "Robustness, no results" in {text.get_text() for text in texts(drawn(failed))}
+    told = [fact for fact in facts.shielding_facts(failed) if fact.key.startswith("map_")]
+    assert [(fact.key, fact.value) for fact in told] == [("map_failed", sweep.sizes["case"])]
+
+
+@pytest.mark.parametrize("key", ["drive.frequency", DIRECTIONS])
+def test_a_sweep_along_one_axis_is_no_map(study: StudyResults, key: str) -> None:
+    sweep = study.problem.sweep
+    assert sweep is not None
+    assert sweep.grid is not None
+    first = next(iter(sweep.values[key]))
+    narrow = sweep.model_copy(update={"grid": {**sweep.grid, key: (first,)}})
+    assert kinds.kind_of(study.problem) is kinds.SHIELDING
+    asked = study.problem.model_copy(update={"sweep": narrow})
+    assert kinds.kind_of(asked) is not kinds.SHIELDING
+
+
+def test_a_study_of_no_paper_is_told_without_it(study: StudyResults) -> None:
+    report = study.problem.report.model_copy(update={"paper": None})
+    posed = study.problem.model_copy(update={"report": report})
+    own = dataclasses.replace(study, problem=posed)
+    for each, there in ((study, True), (own, False)):
+        found = fact_records.quoted(facts.shielding_facts(each), each.problem.report.paper)
+        text = figure.shielding_text(each, "", found)
+        words = " ".join([text.credit, *(fact.note for fact in found)])
+        notes = {fact.key: fact.note for fact in found}
+        assert ("Bordiga" in words) == there
+        assert ("paper" in words) == there
+        assert ("their text" in notes["radius"]) == there
+
+
+def test_recordings_are_shown_at_the_time_that_stands_above_them(study: StudyResults) -> None:
+    """Save few samples: the nearest are elsewhere than the wanted times."""
+    sparse = study.response.isel(time=slice(None, None, 7))
+    times = simulated_rows(study.scene, sparse)[0].time
+    assert np.abs(times - snapshot_times(study.scene, sparse)).max() > 1e-3
+    along = sparse["time"].values
+    data = xr.Dataset(
+        {"measured": ("time", along)}, attrs={"structure": "cloaked", "case": 0, "synthetic": "no"}
+    )
+    recording = RecordedMotion("film", data, along, np.arange(len(along)), 0.9)
+    (row,) = recorded_rows(study.scene, sparse, [recording], times)
+    np.testing.assert_array_equal(row.time, times)
+    np.testing.assert_allclose(row.displacement, times)
