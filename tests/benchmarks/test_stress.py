@@ -210,3 +210,19 @@ def test_stages_settle_that_contract_fast_at_first_and_slowly_then() -> None:
     name = "axial stiffness times 1e+01, shaken at 60 Hz"
     stiff = [case for case in constants.cases(False) if case.name == name]
     assert [attempted(case).verdict for case in stiff] == ["solved"]
+
+
+def test_counts_of_a_part_do_not_replace_those_of_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    toy = StressFamily("toy", "", "", lambda _: [StressCase("good", lambda: found(0.5))])
+    counts, aside = tmp_path / "stress.json", tmp_path / "part.json"
+    monkeypatch.setattr(suite, "FAMILIES", {"toy": toy})
+    monkeypatch.setattr(suite, "COUNTS", counts)
+    for part in (["toy"], ["--small"], ["--only", "good"], ["--tries", "3"]):
+        assert suite.main(part) == 0
+        assert not counts.exists()
+        assert "a part of the suite" in capsys.readouterr().err
+    assert suite.main(["toy", "--out", str(aside)]) == 0
+    assert suite.main([]) == 0
+    assert aside.read_text() == counts.read_text()
