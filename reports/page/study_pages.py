@@ -92,14 +92,16 @@ def study_page(
 ) -> Report:
     """Returns the report of studies, of which everything else has been made.
 
-    The claims on the figure of that name are judged. Studies are named as their datasets are called
-    beside others'; a single one needs no name. `together` is what builds all studies and
-    the problem that asks for them, where one does.
+    The claims on a single study are those on what builds it, since a preset is another design; the
+    claims on several are those on the figure of that name. Studies are named as their datasets are
+    called beside others'; a single one needs no name. `together` is what builds all studies and the
+    problem that asks for them, where one does.
     """
     player, single = payload(animation), "" in studies
     several = list(studies.values())
     draft = list(dict.fromkeys(reason for study in several for reason in study.draft))
-    judged = [] if draft else claims.judged(text.claimed or name, facts)
+    claimed = text.claimed or (studies[""].target if single else name)
+    judged = [] if draft else claims.judged(claimed, facts)
     recordings = studies[""].recordings if single else []
     targets = [together[0]] if together else [study.target for study in several]
     problems = {study.name: study.problem for study in several}

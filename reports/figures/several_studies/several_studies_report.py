@@ -49,6 +49,7 @@ def several_studies_report(
         figure_title="Figure",
         caption=_caption(studies),
         headline=headline,
+        claimed=name if (preset := studies[0].preset) is None else f"{name}@{preset}",
     )
     by_name = {study.name: study for study in studies}
     return study_page(name, by_name, text, facts, tables, figure.draw, _animation(studies))

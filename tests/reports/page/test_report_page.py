@@ -134,3 +134,11 @@ def test_cells_of_a_table() -> None:
     shown = ["'=1+1", "'@a", "'+cmd", "'-5 mm", "−5 mm", "a=b", "-1e-3", "", "'=HYPERLINK(1)"]
     assert [row[0] for row in rows[1:]] == shown
     assert rows[1][1] == "-1"
+
+
+def test_a_preset_is_not_judged_by_the_claims_on_the_study(study: StudyResults) -> None:
+    """Another design than the paper's has no part in what the paper claims."""
+    preset = dataclasses.replace(study, preset="free")
+    of_study, of_preset = (study_report(each).values["claims"] for each in (study, preset))
+    assert len(of_study) > 0
+    assert of_preset == []
