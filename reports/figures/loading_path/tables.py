@@ -73,7 +73,9 @@ def copies(study: StudyResults, made: xr.Dataset) -> Columns:
         "noise": noise.ravel(),
         "sample": sample.ravel(),
         headed(measure.key, measure.unit): values.values.ravel(),
-        "reaction_N": made["reaction"].isel(time=-1).values.ravel(),
     }
+    reaction = made["reaction"].isel(time=-1).values.ravel()
+    if np.isfinite(reaction).any():  # a drive that turns or follows a measured motion tells none
+        columns["reaction_N"] = reaction
     numbers = ("loss", "min_void_angle", "clashes", "redrawn", "status")
     return columns | headed_columns(made, *numbers)

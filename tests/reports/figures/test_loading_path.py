@@ -123,6 +123,13 @@ def test_rows_that_are_held_have_no_lateral_contraction(smile: StudyResults, sup
         assert any("contraction" in panel.head[1] for panel in joint.panels) == there
 
 
+def test_copies_without_a_reaction_have_no_column_of_it(smile: StudyResults) -> None:
+    assert smile.scatter is not None
+    assert "reaction_N" in tables.copies(smile, smile.scatter)
+    unknown = smile.scatter.assign(reaction=np.nan * smile.scatter["reaction"])
+    assert "reaction_N" not in tables.copies(smile, unknown)
+
+
 def test_a_loss_has_its_formula(
     study: StudyResults, shield: StudyResults, smile: StudyResults
 ) -> None:
