@@ -24,7 +24,7 @@ from reports.figures.loading_path import (
     structure_curves,
     structures,
 )
-from reports.figures.wave import edge_contacts
+from reports.figures.wave import contacts, edge_contacts
 from reports.figures.wave.monitored_places import MonitoredUnit, first_structure, places
 from reports.panels import Panel, PanelFigure, measured_overlay
 from reports.study import StudyResults
@@ -65,7 +65,7 @@ def wave_figure(study: StudyResults) -> PanelFigure:
         ),
         Panel(("e", "Mimicking error", 0.0, low), error, _PROSE["e"]),
         Panel(
-            ("f", edge_contacts.contact_measure(study.problem).title, half, low),
+            ("f", contacts.contact_measure(study.problem).title, half, low),
             lambda figure: _edges(
                 style.place(figure, half + 11.0, low + ROOM, half - 14.0, 27.0), study
             ),
@@ -93,7 +93,7 @@ def _mark(place: MonitoredUnit, size: float) -> dict[str, Any]:
 def _contacts(study: StudyResults, axes: Axes, row: SnapshotStructure, sample: int) -> None:
     """Draws dots where the structure is in contact."""
     part = row.part.isel(case=row.case)
-    x, y = edge_contacts.contact_places(study.problem, part, sample).T
+    x, y = contacts.contact_places(study.problem, part, sample).T
     axes.plot(x, y, ls="", marker="o", ms=2.4, mfc=CONTACT, mec="white", mew=0.3, zorder=8)
 
 
@@ -118,7 +118,7 @@ def _places(figure: Figure, study: StudyResults, top: float) -> None:
 def _edges(axes: Axes, study: StudyResults) -> None:
     """Draws how near neighbours on the edges are over time, and when that is contact."""
     path = abscissa_of(study.problem, study.response)
-    measure = edge_contacts.contact_measure(study.problem)
+    measure = contacts.contact_measure(study.problem)
     path_axes(axes, path, measure.axis)
     nearest = edge_contacts.along_edges(study.problem, study.response).min("ligament")
     values = measure.shown * nearest
@@ -144,7 +144,7 @@ def _over_time(study: StudyResults) -> Columns:
     }
     series |= {
         "mimicking_error": measures.measure_of(problem).of(response),
-        edge_contacts.contact_measure(problem).column: edges.min("ligament"),
+        contacts.contact_measure(problem).column: edges.min("ligament"),
         "strain_energy_Nmm": response["strain_energy"],
         "contact_energy_Nmm": response["contact_energy"],
         "min_void_angle_rad": response["min_void_angle"],

@@ -6,7 +6,7 @@ from pipeline.posing import law_comparison
 from pipeline.runtime import ROOT
 from reports.figures import kinds
 from reports.figures.loading_path import measures
-from reports.figures.wave import closed_voids, edge_contacts, facts
+from reports.figures.wave import contacts, edge_contacts, facts
 from reports.figures.wave.monitored_places import places, relative_error
 from reports.study import StudyResults, deformed, from_dataset
 
@@ -23,21 +23,21 @@ def test_a_mimicked_wave_has_its_own_report(shield: StudyResults, smile: StudyRe
 def test_void_angles_of_rotated_squares(smile: StudyResults) -> None:
     """Squares turned by 20 degrees leave voids of 50 and 130 degrees beside every ligament."""
     part = smile.response.sel(structure="intact")
-    angles = np.degrees(closed_voids.rest_angles(from_dataset(part, 15.0)))
+    angles = np.degrees(contacts.rest_angles(from_dataset(part, 15.0)))
     np.testing.assert_allclose(np.sort(angles, axis=1), [[50.0, 130.0]] * len(angles), atol=1e-9)
 
 
 def test_voids_close_by_turns_and_the_middle_of_an_edge_is_shown(smile: StudyResults) -> None:
     part = smile.response.sel(structure="intact").isel(case=0, time=[0]).copy(deep=True)
     structure = from_dataset(part, 15.0)
-    rest = closed_voids.rest_angles(structure)
+    rest = contacts.rest_angles(structure)
     k = int(np.argmin(rest[:, 0]))
-    assert not closed_voids.closed(smile.problem, part).any()
+    assert not contacts.closed(smile.problem, part).any()
     turned = {"time": 0, "unit": int(structure.ligament_unit[k, 0]), "dof": 2}
     part["displacement"][turned] = CUTOFF - rest[k, 0] - 1e-6
-    found = closed_voids.closed(smile.problem, part)[0]
+    found = contacts.closed(smile.problem, part)[0]
     assert found[k]
-    assert closed_voids.smaller_angles(smile.problem, part)[0, k] == pytest.approx(CUTOFF - 1e-6)
+    assert contacts.smaller_angles(smile.problem, part)[0, k] == pytest.approx(CUTOFF - 1e-6)
     part = smile.response.sel(structure="altered")
     assert edge_contacts.on_edges(from_dataset(part, 15.0)).sum() == 2 * 14
     (place,) = places(smile.problem, smile.response)
@@ -63,11 +63,11 @@ def test_contacts_are_counted_by_the_law_that_the_study_runs_under(smile: StudyR
     assert counted == [1, 0]
     part = response.sel(structure="intact").isel(case=0)
     frame = part["displacement"].isel(time=0).transpose("unit", "dof").values
-    middle = closed_voids.middles(structure, deformed(structure, frame))[k]
-    places = edge_contacts.contact_places(geometric, part, 0)
+    middle = contacts.middles(structure, deformed(structure, frame))[k]
+    places = contacts.contact_places(geometric, part, 0)
     np.testing.assert_allclose(places, [middle], atol=0.1)
-    assert edge_contacts.contact_places(angle, part, 0).size == 0
-    assert edge_contacts.contact_measure(geometric).column == "edge_distance_mm"
+    assert contacts.contact_places(angle, part, 0).size == 0
+    assert contacts.contact_measure(geometric).column == "edge_distance_mm"
 
 
 def test_relative_error_by_hand(smile: StudyResults) -> None:
