@@ -4,6 +4,7 @@ import argparse
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 
 from pipeline import datasets, problem
 from pipeline.problem.sections import names_directions
@@ -34,14 +35,22 @@ def report(args: argparse.Namespace) -> None:
     data = datasets.read(args.sweep, "sweep")
     study_results.check_problem(asked, "sweep", data, args.sweep)
     caption = _PROSE["maps" if cases.mapped(sweep) else "points"]
+    why = draft.reasons(asked, whole)
+
+    def drawn() -> Figure:
+        made = figure.draw_sweep(data, sweep)
+        if why:
+            draft.mark(made)
+        return made
+
     made = figure_page(
         "sweep",
         FigureText(titled(asked, args.problem), "sweep", _PROSE["lead"], caption),
-        lambda: figure.draw_sweep(data, sweep),
+        drawn,
         tables(data),
         data,
         shown=shown(data),
-        draft=draft.reasons(asked, whole),
+        draft=why,
         parents=["design"],
     )
     publish(made, args.out_dir)

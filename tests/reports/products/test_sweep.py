@@ -97,6 +97,20 @@ def test_the_same_dataset_gives_the_same_bytes(tmp_path: Path, drawn_map: Path) 
     assert all((first / name).read_bytes() == (second / name).read_bytes() for name in names)
 
 
+def test_the_figure_of_a_draft_is_marked(tmp_path: Path, drawn_map: Path) -> None:
+    """Mark the file too, which goes on without its page."""
+    at, data = paths(
+        tmp_path, f"{CURVE}\npresets: {{ quick: {{ solver: {{ accuracy: draft }} }} }}\n"
+    )
+    asked = problem.load(at, "quick")
+    held = datasets.read(data, "sweep")
+    datasets.write(held.drop_attrs(deep=False), data, "sweep", provenance.of_study(asked, "sweep"))
+    words = ["--problem", str(at), "--preset", "quick", "--sweep", str(data)]
+    assert main(["sweep", *words, "--out-dir", str(tmp_path / "sweep")]) == 0
+    assert "DRAFT" in (tmp_path / "sweep/sweep.svg").read_text()
+    assert "DRAFT" not in (drawn_map / "sweep.svg").read_text()
+
+
 @pytest.mark.parametrize(("samples", "size", "shade"), [(12, 3.5, 0.9), (400, 1.5, 0.5)])
 def test_few_points_are_large_and_the_legend_shows_points(
     samples: int, size: float, shade: float, tmp_path: Path
