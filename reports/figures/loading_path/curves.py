@@ -96,8 +96,8 @@ def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Meas
             "Unloaded" if problem.objective.target == "rest" else display_name(problem, "intact")
         )
         axes.plot(path.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label=f"{still}: zero")
-    if study.scatter is not None and copies_banded(study):
-        _bands(axes, study, path, measure, study.scatter)
+    if (copied := banded_copies(study)) is not None:
+        _bands(axes, study, path, measure, copied)
     measured.bands(axes, study, measure.key)
     measured.measured_curves(axes, study, path, measure.of, names)
     legend = axes.legend(loc="upper left", handlelength=1.2)
@@ -113,10 +113,10 @@ def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Meas
         axes.set_ylim(0, above * axes.get_ylim()[1])
 
 
-def copies_banded(study: StudyResults) -> bool:
-    """Tests if bands of imperfect copies are drawn: prediction bands would lie over them."""
+def banded_copies(study: StudyResults) -> xr.Dataset | None:
+    """Returns imperfect copies of which bands are drawn: none where prediction bands are."""
     key = measures.measure_of(study.problem).key
-    return study.scatter is not None and not measured.has_bands(study, key)
+    return None if measured.has_bands(study, key) else study.scatter
 
 
 def _vanishes(problem: Problem, values: xr.DataArray) -> bool:

@@ -159,7 +159,7 @@ def _side_by_side(shown: Sequence[Curve], top: float) -> Iterator[Panel]:
 
 def marks(studies: Sequence[StudyResults]) -> str:
     """Tells what else is drawn with the curves of the measure, each after a semicolon."""
-    bands = any(curves.copies_banded(study) for study in studies)
+    bands = any(curves.banded_copies(study) is not None for study in studies)
     jumps = any((study.response["stability"] >= JUMPED).any() for study in studies)
     second = any(study.redesign is not None and study.redesign.changed for study in studies)
     shown = {"bands": bands, "jumps": jumps, "second": second}
