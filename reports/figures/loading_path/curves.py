@@ -54,7 +54,7 @@ def path_axes(axes: Axes, path: Abscissa, label: str) -> None:
     above = axes.secondary_xaxis(
         "top", functions=(lambda x: np.multiply(x, ratio), lambda x: np.divide(x, ratio))
     )
-    above.set_xlabel("paper’s label ε (%)", labelpad=2.5, fontsize=style.SMALL)
+    above.set_xlabel("Paper’s label ε (%)", labelpad=2.5, fontsize=style.SMALL)
     above.xaxis.set_major_locator(FixedLocator(list(ratio * path.values[list(path.shown)])))
     above.xaxis.set_major_formatter(lambda value, _: f"{value:.2g}")
 
@@ -186,7 +186,7 @@ def contraction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
     def of(response: xr.Dataset) -> xr.DataArray:
         return measures.contraction(study.problem, response)
 
-    _plain_panel(axes, study.problem, path, of(study.response), "contraction (mm)")
+    _plain_panel(axes, study.problem, path, of(study.response), "Contraction (mm)")
     measured.bands(axes, study, "contraction")
     measured.measured_curves(axes, study, path, of, structures(study.response))
     _sides(axes, study)
@@ -241,7 +241,7 @@ def _eigenvalues(axes: Axes, study: StudyResults, path: Abscissa) -> None:
         right.plot(path.values, mean.sel(structure=name), color=colour, lw=1.0, ls=":")
     # below the legend that tells measured curves from simulated ones
     room = 1.5 if study.recordings and study.problem.objective.target == "rest" else 1.05
-    right.set(ylim=(0.0, room * max(0.0, float(mean.max())) or None), ylabel="eigenvalue (N/m)")
+    right.set(ylim=(0.0, room * max(0.0, float(mean.max())) or None), ylabel="Eigenvalue (N/m)")
     right.yaxis.set_major_locator(MaxNLocator(4))
 
 

@@ -37,12 +37,12 @@ def drive_response(problem: Problem) -> DriveResponse:
     kind = single_drives(problem.drive)[0].kind
     if kind == "force":
         moved = partial(driven_displacement, problem)
-        return DriveResponse("displacement", "Displacement", "displacement (mm)", "mm", moved)
+        return DriveResponse("displacement", "Displacement", "Displacement (mm)", "mm", moved)
     if kind == "torque":
-        return DriveResponse("turn", "Rotation", "rotation (°)", "deg", partial(_turn, problem))
+        return DriveResponse("turn", "Rotation", "Rotation (°)", "deg", partial(_turn, problem))
     if kind == "rotation":
-        return DriveResponse("moment", "Moment", "moment (N mm)", "N mm", partial(_moment, problem))
-    return DriveResponse("reaction", "Reaction", "force (N)", "N", partial(_force, problem))
+        return DriveResponse("moment", "Moment", "Moment (N mm)", "N mm", partial(_moment, problem))
+    return DriveResponse("reaction", "Reaction", "Force (N)", "N", partial(_force, problem))
 
 
 def driven_displacement(problem: Problem, response: xr.Dataset) -> xr.DataArray:

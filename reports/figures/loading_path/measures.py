@@ -31,7 +31,7 @@ def measure_of(problem: Problem) -> Measure:
     """Returns the measure that goes with a problem's objective."""
     scale = scales(problem)
     if problem.objective.kind == "strain_energy":
-        symbol = r"mean $|\theta|$ (°)"
+        symbol = r"Mean $|\theta|$ (°)"
         return Measure("rotation", "Mean |θ| in the region of interest", symbol, "deg", rotation)
     if problem.objective.target == "rest":
         symbol = r"RMS $\|\mathbf{U}\|$"
@@ -41,7 +41,7 @@ def measure_of(problem: Problem) -> Measure:
     return Measure(
         "mismatch",
         "Mimicking error",
-        "mimicking error",
+        "Mimicking error",
         "1",
         lambda r: mismatch(r, scale, problem.static),
         f", ‖U − U₀‖ / {'‖U₀‖ at full load' if problem.static else 'max ‖U₀‖'} over the region of"

@@ -41,7 +41,7 @@ def contact_measure(problem: Problem) -> ContactMeasure:
     if contact.law == "geometric":
         return ContactMeasure(
             title="Nearest neighbours along the top and bottom edges",
-            axis="distance (mm)",
+            axis="Distance (mm)",
             column="edge_distance_mm",
             shown=1.0,
             begins=contact_distance(problem),
@@ -50,7 +50,7 @@ def contact_measure(problem: Problem) -> ContactMeasure:
         )
     return ContactMeasure(
         title="Smallest void angle along the top and bottom edges",
-        axis="angle (°)",
+        axis="Void angle (°)",
         column="edge_void_angle_rad",
         shown=180.0 / np.pi,
         begins=contact.cutoff_angle,

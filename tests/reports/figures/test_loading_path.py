@@ -307,7 +307,7 @@ def test_the_figure_is_legible(name: str, request: pytest.FixtureRequest) -> Non
 
 def test_the_figure_names_structures_units_and_the_papers_label(shield: StudyResults) -> None:
     words = figure_assertions.words(made(shield))
-    assert {"Uncloaked", "Cloaked", "Unloaded: zero", "paper’s label ε (%)", "force (N)"} <= words
+    assert {"Uncloaked", "Cloaked", "Unloaded: zero", "Paper’s label ε (%)", "Force (N)"} <= words
     assert set("abcdef") <= words
     drafted = dataclasses.replace(shield, draft=("9 units instead of 225",))
     assert "DRAFT" in figure_assertions.words(made(drafted))
@@ -480,9 +480,9 @@ def moved_as(values: xr.DataArray, course: np.ndarray) -> xr.DataArray:
 @pytest.mark.parametrize(
     ("drive", "name", "amplitude", "shown", "axis", "key"),
     [
-        (ForceDrive, "force", "2 N", "$F$ = 2 N", "displacement (mm)", "displacement_cloaked"),
-        (TorqueDrive, "torque", "3 N mm", "$M$ = 3 N mm", "rotation (°)", "turn_cloaked"),
-        (RotationDrive, "rotation", "1 deg", r"$\theta$ = 1°", "moment (N mm)", "moment_cloaked"),
+        (ForceDrive, "force", "2 N", "$F$ = 2 N", "Displacement (mm)", "displacement_cloaked"),
+        (TorqueDrive, "torque", "3 N mm", "$M$ = 3 N mm", "Rotation (°)", "turn_cloaked"),
+        (RotationDrive, "rotation", "1 deg", r"$\theta$ = 1°", "Moment (N mm)", "moment_cloaked"),
     ],
 )
 def test_a_drive_is_answered_by_what_is_conjugate_to_it(
