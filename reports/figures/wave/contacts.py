@@ -37,24 +37,28 @@ class ContactMeasure:
 
 def contact_measure(problem: Problem) -> ContactMeasure:
     """Chooses the measure of contact: angles of voids, or distances of units."""
-    contact = problem.contact
-    if contact.law == "geometric":
-        return ContactMeasure(
-            title="Nearest neighbours along the top and bottom edges",
-            axis="Distance (mm)",
-            column="edge_distance_mm",
-            shown=1.0,
-            begins=contact_distance(problem),
-            end=0.0,
-            of=joined_distances,
-        )
+    if problem.contact.law != "geometric":
+        return void_measure(problem)
+    return ContactMeasure(
+        title="Nearest neighbours along the top and bottom edges",
+        axis="Distance (mm)",
+        column="edge_distance_mm",
+        shown=1.0,
+        begins=contact_distance(problem),
+        end=0.0,
+        of=joined_distances,
+    )
+
+
+def void_measure(problem: Problem) -> ContactMeasure:
+    """Describes contact by the angles of voids, as the authors have it."""
     return ContactMeasure(
         title="Smallest void angle along the top and bottom edges",
         axis="Void angle (°)",
         column="edge_void_angle_rad",
         shown=180.0 / np.pi,
-        begins=contact.cutoff_angle,
-        end=contact.barrier_angle,
+        begins=problem.contact.cutoff_angle,
+        end=problem.contact.barrier_angle,
         of=smaller_angles,
     )
 

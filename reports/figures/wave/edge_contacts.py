@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem import Problem
-from reports.figures.wave.contacts import contact_measure
+from reports.figures.wave.contacts import ContactMeasure
 from reports.study import RigidUnits, from_dataset
 from sim.core import Mask
 
@@ -16,10 +16,10 @@ def on_edges(structure: RigidUnits) -> Mask:
     return np.asarray(np.isin(height, ends).all(axis=1) & (np.ptp(height, axis=1) == 0.0))
 
 
-def along_edges(problem: Problem, response: xr.Dataset) -> xr.DataArray:
+def along_edges(problem: Problem, response: xr.Dataset, measure: ContactMeasure) -> xr.DataArray:
     """Measures contact (structure, case, time, ligament) along the edges."""
     whole = from_dataset(response.isel(structure=0), problem.lattice.spacing)
-    n_edge, measure = int(on_edges(whole).sum()), contact_measure(problem)
+    n_edge = int(on_edges(whole).sum())
     found = np.full(
         (*(response.sizes[dim] for dim in ("structure", "case", "time")), n_edge), np.nan
     )
@@ -34,6 +34,6 @@ def along_edges(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     return xr.DataArray(found, {name: response[name] for name in known}, dims)
 
 
-def edge_contacts(problem: Problem, response: xr.Dataset) -> xr.DataArray:
+def edge_contacts(problem: Problem, response: xr.Dataset, measure: ContactMeasure) -> xr.DataArray:
     """Counts contacts (structure, case, time) of neighbours along the top and bottom edges."""
-    return (along_edges(problem, response) < contact_measure(problem).begins).sum("ligament")
+    return (along_edges(problem, response, measure) < measure.begins).sum("ligament")

@@ -120,7 +120,7 @@ def _edges(axes: Axes, study: StudyResults) -> None:
     path = abscissa_of(study.problem, study.response)
     measure = contacts.contact_measure(study.problem)
     path_axes(axes, path, measure.axis)
-    nearest = edge_contacts.along_edges(study.problem, study.response).min("ligament")
+    nearest = edge_contacts.along_edges(study.problem, study.response, measure).min("ligament")
     values = measure.shown * nearest
     structure_curves(axes, study.problem, path, values, structures(study.response))
     begins, end = measure.shown * measure.begins, measure.shown * measure.end
@@ -137,14 +137,15 @@ def _over_time(study: StudyResults) -> Columns:
     """Returns one row a sample: u_y where marked, mimicking error, edges, energies."""
     problem, response = study.problem, study.response
     rise = response["displacement"].sel(dof="uy")
-    edges = edge_contacts.along_edges(problem, response)
+    measure = contacts.contact_measure(problem)
+    edges = edge_contacts.along_edges(problem, response, measure)
     series = {
         f"uy_{k + 1}_mm": rise.isel(unit=place.unit)
         for k, place in enumerate(places(problem, response))
     }
     series |= {
         "mimicking_error": measures.measure_of(problem).of(response),
-        contacts.contact_measure(problem).column: edges.min("ligament"),
+        measure.column: edges.min("ligament"),
         "strain_energy_Nmm": response["strain_energy"],
         "contact_energy_Nmm": response["contact_energy"],
         "min_void_angle_rad": response["min_void_angle"],

@@ -52,15 +52,19 @@ def test_contacts_are_counted_by_the_law_that_the_study_runs_under(smile: StudyR
     structure = from_dataset(response.sel(structure="intact"), 15.0)
     k = int(np.flatnonzero(edge_contacts.on_edges(structure))[0])
     a, b = structure.ligament_unit[k]
-    at_rest = edge_contacts.along_edges(geometric, response)
+    at_rest = edge_contacts.along_edges(geometric, response, contacts.contact_measure(geometric))
     np.testing.assert_allclose(at_rest.min(), smile.problem.lattice.ligament_length, rtol=1e-9)
     apart = structure.site[b] - structure.site[a]
     near = apart / np.linalg.norm(apart) * (float(at_rest.min()) - 0.01)
     moved = {"structure": 0, "case": 0, "time": 0, "unit": int(a)}
     response["displacement"][moved | {"dof": slice(0, 2)}] = near
     laws = (geometric, angle)
-    counted = [edge_contacts.edge_contacts(each, response).item() for each in laws]
+    measures = [contacts.contact_measure(each) for each in laws]
+    counted = [
+        edge_contacts.edge_contacts(geometric, response, measure).item() for measure in measures
+    ]
     assert counted == [1, 0]
+    assert contacts.void_measure(geometric) == measures[1]
     part = response.sel(structure="intact").isel(case=0)
     frame = part["displacement"].isel(time=0).transpose("unit", "dof").values
     middle = contacts.middles(structure, deformed(structure, frame))[k]
