@@ -47,18 +47,13 @@ def work(args: argparse.Namespace) -> None:
         what = "a crate holds the sources of a checkout, which an installed package lacks"
         raise UserError(what, remedy="clone the repository, and there: make publish STUDY=name")
     asked = Publication.of(args.target)
-    page = ROOT / "results" / asked.target / "report/index.html"
-    if not page.is_file():
-        remedy = f"build it first: make {asked.target}"
-        raise UserError("there is no built study to publish", file=page, remedy=remedy)
-    check_page(asked, page)
-    check_sources()
-    for name in asked.folders:
-        check_commits(ROOT / "results" / name)
     default = ROOT / "results" / f"{asked.target}_crate"
     out = default if args.out_dir is None else args.out_dir
-    if out.exists():
-        raise UserError("the folder is there already", file=out, remedy="remove it, or --out-dir")
+    check_place(out)
+    check_sources()
+    if args.check:
+        return
+    check_results(asked)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=out.parent, prefix=f".{out.name}_") as place:
@@ -70,6 +65,31 @@ def work(args: argparse.Namespace) -> None:
     except OSError as error:
         raise refusal(out, error) from error
     LOG.info("crate: %s", out)
+
+
+def check_place(out: Path) -> None:
+    """Checks that the folder of a crate is not there yet.
+
+    Raises:
+        UserError: it is.
+    """
+    if out.exists():
+        raise UserError("the folder is there already", file=out, remedy="remove it, or --out-dir")
+
+
+def check_results(asked: Publication) -> None:
+    """Checks that a page is built, of the problems as they stand, and by these sources.
+
+    Raises:
+        UserError: it is not.
+    """
+    page = ROOT / "results" / asked.target / "report/index.html"
+    if not page.is_file():
+        remedy = f"build it first: make {asked.target}"
+        raise UserError("there is no built study to publish", file=page, remedy=remedy)
+    check_page(asked, page)
+    for name in asked.folders:
+        check_commits(ROOT / "results" / name)
 
 
 def check_page(asked: Publication, page: Path) -> None:

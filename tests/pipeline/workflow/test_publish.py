@@ -1,3 +1,4 @@
+import argparse
 import json
 import shutil
 import subprocess
@@ -156,6 +157,18 @@ def test_sources_that_are_not_as_committed_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="not as committed") as told:
         publish.check_sources(tmp_path)
     assert told.value.file == str(tmp_path / "sim/a.py")
+
+
+def test_sources_and_place_are_checked_before_a_build(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(publish, "check_sources", lambda: None)
+    asked = argparse.Namespace(target="fig4@quick", out_dir=tmp_path / "crate", check=True)
+    publish.work(asked)  # of which nothing is built
+    assert not asked.out_dir.exists()
+    asked.out_dir.mkdir()
+    with pytest.raises(UserError, match="there already"):
+        publish.work(asked)
 
 
 def test_its_sources_name_the_commit(crate: Path, monkeypatch: pytest.MonkeyPatch) -> None:
