@@ -1,7 +1,6 @@
 import dataclasses
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
@@ -9,13 +8,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.patches import ArrowStyle, FancyArrowPatch
 
-from pipeline.comparison import middle_units
 from pipeline.posing import law_comparison
-from pipeline.problem import Output, selected_units
-from pipeline.problem.sections import ForceDrive, Paper, RotationDrive, TimeSeriesDrive, TorqueDrive
-from reports.base import style
+from pipeline.problem import Output
+from pipeline.problem.sections import Paper
 from reports.facts import checks, fact_records, loss_formula
 from reports.facts.copies import spreads
 from reports.figures import kinds
@@ -23,40 +19,19 @@ from reports.figures.loading_path import (
     abscissa,
     curves,
     figure,
-    measured,
     measures,
-    monte_carlo,
     tables,
 )
 from reports.figures.loading_path import facts as path_facts
-from reports.figures.loading_path.drive_response import drive_response
-from reports.figures.loading_path.structure_panels import rest_panel
 from reports.figures.robust_table import robust_table
-from reports.figures.several_studies.figure import several_studies_figure
 from reports.figures.shielding import facts as shielding
 from reports.figures.study_report import as_built_facts, study_report
 from reports.page import publish
 from reports.panels import payload
-from reports.study import CLAMPED, DRIVEN, StudyResults
-from tests.reports import compressed_study, figure_assertions, recorded_study
+from reports.study import StudyResults
+from tests.reports import figure_assertions, recorded_study
+from tests.reports.loading_paths import made, values
 from tests.tables import refused, some
-
-S = 15.0
-
-
-def made(study: StudyResults) -> Figure:
-    with style.styled():
-        return figure_assertions.drawn(figure.loading_path_figure(study).draw())
-
-
-def values(study: StudyResults) -> dict[str, fact_records.Fact]:
-    known = fact_records.quoted(path_facts.loading_path_facts(study), study.problem.report.paper)
-    return {fact.key: fact for fact in known}
-
-
-def motion(study: StudyResults, structure: str) -> np.ndarray:
-    found = study.response["displacement"].sel(structure=structure).isel(case=0)
-    return np.asarray(found.values)
 
 
 def changed(study: StudyResults, name: Output, made: xr.Dataset) -> StudyResults:
@@ -72,55 +47,6 @@ def test_kinds_of_reports(study: StudyResults, shield: StudyResults, smile: Stud
     off_centre = study.problem.model_copy(update={"cloak": cloak})
     for problem in (without, off_centre, shield.problem, smile.problem):
         assert kinds.kind_of(problem).facts is path_facts.loading_path_facts
-
-
-def test_mean_rotation_by_hand(shield: StudyResults) -> None:
-    units = np.flatnonzero(shield.response["roi"].values)
-    for name in ("altered", "cloaked"):
-        turned = motion(shield, name)[:, units, 2]
-        expected = [np.degrees(sum(abs(turn) for turn in row) / len(units)) for row in turned]
-        found = measures.rotation(shield.response).sel(structure=name).isel(case=0)
-        np.testing.assert_allclose(found, expected, rtol=1e-12)
-    assert values(shield)["rotation_reduction"].value == pytest.approx(90.0)
-
-
-def test_mimicking_error_by_hand(smile: StudyResults) -> None:
-    units = np.flatnonzero(smile.response["roi"].values)
-    intact, altered = (motion(smile, name)[:, units] for name in ("intact", "altered"))
-
-    def size(field: np.ndarray) -> float:
-        return float(sum((x / S) ** 2 + (y / S) ** 2 + turn**2 for x, y, turn in field) ** 0.5)
-
-    expected = [size(altered[t] - intact[t]) / size(intact[-1]) for t in range(len(intact))]
-    found = measures.measure_of(smile.problem).of(smile.response).sel(structure="altered")
-    np.testing.assert_allclose(found.isel(case=0), expected, rtol=1e-12)
-    assert measures.measure_of(smile.problem).of(smile.response).sel(structure="intact").max() == 0
-
-
-def test_contraction_of_middle_columns_and_force_on_units(smile: StudyResults) -> None:
-    waist = np.mean([np.sin(np.pi * i / 14) for i in range(4, 11)])
-    found = measures.contraction(smile.problem, smile.response).isel(case=0, time=-1)
-    for name, pull in compressed_study.DRAW.items():
-        assert float(found.sel(structure=name)) == pytest.approx(pull * waist)
-    assert middle_units(smile.problem, "bottom") == list(range(4, 11))
-    forces = drive_response(smile.problem).of(smile.response).isel(case=0)
-    np.testing.assert_allclose(forces.isel(time=-1), list(compressed_study.FORCE.values()))
-    np.testing.assert_allclose(forces.isel(time=0), 0.0)
-
-
-@pytest.mark.parametrize("support", [CLAMPED, DRIVEN])
-def test_rows_that_are_held_have_no_lateral_contraction(smile: StudyResults, support: int) -> None:
-    """Press the lattice from the top: how much nearer the rows come is the drive's displacement."""
-    held = smile.response.copy(deep=True)
-    held["support"].loc[{"unit": middle_units(smile.problem, "top")}] = support
-    pressed = dataclasses.replace(smile, datasets={**smile.datasets, "response": held})
-    for study, there in ((smile, True), (pressed, False)):
-        whole, joint = figure.loading_path_figure(study), several_studies_figure([study])
-        path = abscissa.abscissa_of(study.problem, study.response)
-        assert ("Lateral contraction" in {panel.head[1] for panel in whole.panels}) == there
-        assert bool(list(path_facts.contraction_facts(study, path))) == there
-        assert ("cloaked_contraction_mm" in tables.path(study)) == there
-        assert any("contraction" in panel.head[1] for panel in joint.panels) == there
 
 
 def test_copies_without_a_reaction_have_no_column_of_it(smile: StudyResults) -> None:
@@ -198,42 +124,6 @@ def test_the_axis_is_the_displacement_of_the_driven_units(shield: StudyResults) 
     assert [way.at(k) for k in way.shown] == [
         "0 mm (0 %)", "5.62 mm (3.8 %)", "11.2 mm (7.5 %)", "15 mm (10 %)",
     ]  # fmt: skip
-
-
-def test_copies_are_measured_like_the_structure(shield: StudyResults, smile: StudyResults) -> None:
-    units = smile.response["roi"].values.astype(bool)
-    scaled = motion(smile, "intact")[-1, units] / [S, S, 1.0]
-    relative = np.sqrt(units.sum()) / np.linalg.norm(scaled)
-    for study, factor in ((shield, np.degrees(1.0)), (smile, relative)):
-        copies, measure = study.scatter, measures.measure_of(study.problem)
-        assert copies is not None
-        found = monte_carlo.copy_curves(study.problem, measure, study.response, copies)
-        np.testing.assert_allclose(found, factor * copies["rotation"], rtol=1e-12)
-
-
-@pytest.mark.parametrize("of", [measures.motion, measures.mismatch])
-def test_units_that_were_lost_do_not_count(
-    smile: StudyResults, of: Callable[..., xr.DataArray]
-) -> None:
-    """Loses half of the units, which all miss the target by as much."""
-    apart = smile.response.copy(deep=True)
-    apart["displacement"][:] = 1.0
-    apart["displacement"].loc[{"structure": "cloaked"}] = 3.0
-    lost = apart.copy(deep=True)
-    lost["displacement"].loc[{"structure": "cloaked", "unit": apart["unit"][::2]}] = np.nan
-    seen, some = (of(made, (S, S, 1.0)).sel(structure="cloaked") for made in (apart, lost))
-    np.testing.assert_allclose(some, seen)
-
-
-def test_a_measured_motion_in_time_is_its_mean(study: StudyResults, tmp_path: Path) -> None:
-    filmed = recorded_study.with_recordings(study, tmp_path, ("cloaked", 0))
-    path = abscissa.abscissa_of(study.problem, study.response)
-    found = {fact.key: fact.value for fact in measured.measured_facts(filmed, path)}
-    key = measures.measure_of(study.problem).key
-    [recording] = filmed.recordings
-    course = measured.curve(filmed, path, recording, measures.measure_of(study.problem).of)
-    rms = np.sqrt(np.nanmean(course**2))
-    assert found[f"measured_{key}_cloaked"] == pytest.approx(float(rms))
 
 
 def test_contacts_are_those_at_the_end_of_the_path(smile: StudyResults) -> None:
@@ -430,80 +320,6 @@ def test_the_page_is_whole(shield: StudyResults, tmp_path: Path) -> None:
     of = ("Mean |θ| in the region of interest", "Loss")
     once = [label for each in of for label in (f"{each}: nominal, or median", "95 % keep below")]
     assert cells == once * (len(cells) // 4)
-
-
-@pytest.mark.parametrize(
-    ("course", "angle", "look"),
-    [
-        ((0.0, 1.0, 3.0), 180.0, "-|>"),
-        ((0.0, -1.0, -3.0), 0.0, "-|>"),
-        ((0.0, 3.0, -2.9), 0.0, "<|-|>"),
-    ],
-)
-@pytest.mark.parametrize("turn", [0.0, 90.0])
-def test_a_measured_motion_is_answered_along_its_largest_displacement(
-    smile: StudyResults, course: tuple[float, ...], angle: float, look: str, turn: float
-) -> None:
-    """The arrows lie along it too; one that goes to both sides has two heads."""
-    drive = TimeSeriesDrive.model_validate(
-        {"kind": "time_series", "units": "right", "file": "shaker.csv"}
-    )
-    asked = smile.problem.model_copy(update={"drive": drive})
-    response = smile.response.isel(time=slice(0, 3)).copy(deep=True)
-    way, across = np.radians(180.0 + turn), np.radians(90.0 + turn)
-    for key, far in (("displacement", np.array(course)), ("reaction_force", np.ones(3))):
-        moved = np.stack([far * np.cos(way), far * np.sin(way), 0.0 * far], axis=-1)
-        response[key] = moved_as(response[key], moved)
-    response["reaction_force"] += 5.0 * xr.DataArray(
-        [np.cos(across), np.sin(across), 0.0], dims="dof"
-    )
-    forces = drive_response(asked).of(response).isel(structure=0, case=0)
-    shown = np.radians(angle + turn)
-    driven = len(selected_units(drive.units, asked.lattice))
-    np.testing.assert_allclose(forces, driven * np.cos(shown - way), atol=1e-9)
-    axes = Figure().add_subplot()
-    rest_panel(axes, asked, response, "altered")
-    arrows = [each for each in axes.patches if isinstance(each, FancyArrowPatch)]
-    assert len(arrows) == 3
-    for each in arrows:
-        start, end = np.array(vars(each)["_posA_posB"])
-        along = (end - start) / np.linalg.norm(end - start)
-        np.testing.assert_allclose(along, [np.cos(shown), np.sin(shown)], atol=1e-9)
-        assert type(each.get_arrowstyle()) is ArrowStyle.get_styles()[look]
-
-
-def moved_as(values: xr.DataArray, course: np.ndarray) -> xr.DataArray:
-    """Values in which all units follow one course (time, dof)."""
-    return xr.zeros_like(values) + xr.DataArray(course, dims=("time", "dof"))
-
-
-@pytest.mark.parametrize(
-    ("drive", "name", "amplitude", "shown", "axis", "key"),
-    [
-        (ForceDrive, "force", "2 N", "$F$ = 2 N", "Displacement (mm)", "displacement_cloaked"),
-        (TorqueDrive, "torque", "3 N mm", "$M$ = 3 N mm", "Rotation (°)", "turn_cloaked"),
-        (RotationDrive, "rotation", "1 deg", r"$\theta$ = 1°", "Moment (N mm)", "moment_cloaked"),
-    ],
-)
-def test_a_drive_is_answered_by_what_is_conjugate_to_it(
-    smile: StudyResults,
-    drive: type[ForceDrive | TorqueDrive | RotationDrive],
-    name: str,
-    amplitude: str,
-    shown: str,
-    axis: str,
-    key: str,
-) -> None:
-    way = {"directions": ["180 deg"]} if name == "force" else {}
-    given = {"kind": name, "units": "right", "amplitude": amplitude, **way}
-    asked = drive.model_validate(given)
-    problem = smile.problem.model_copy(update={"drive": asked})
-    study = dataclasses.replace(smile, problem=problem)
-    drawn = made(study)
-    words = [text.get_text() for axes in drawn.axes for text in axes.texts]
-    assert shown in [*words, *(text.get_text() for text in drawn.texts)]
-    assert axis in [axes.get_ylabel() for axes in drawn.axes]
-    assert key in values(study)
 
 
 @pytest.mark.parametrize("law", ["angle", "geometric"])
