@@ -171,11 +171,14 @@ def _compared(figure: Figure, study: StudyResults, at: tuple[float, float]) -> N
         colour = style.STRUCTURE_COLOURS[name]
         axes.plot(series["time"], series.sel(structure=name), color=colour, lw=1.0)
     unit = middle_of_top_edge(from_dataset(study.response.isel(structure=0), study.scene.spacing))
-    for each in monitored_recordings(study):
+    recordings = list(monitored_recordings(study))
+    for each in recordings:
         values = each.values(each.data["measured"].isel(unit=unit).sel(dof="uy"))
         measured_overlay.measured_curve(
             axes, each.along, values, style.STRUCTURE_COLOURS[each.structure]
         )
+    if recordings:
+        axes.set_title(f"dots: {recordings[0].source}", fontsize=style.SMALL, pad=2.0)
     axes.set_xlabel("$t$ (s)", labelpad=1.0)
     axes.set_ylabel("$u_y$ (mm)", labelpad=1.0)
 
