@@ -35,6 +35,7 @@ SOCKET = "METACLOAK_STAGES"
 
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 _STREAMS = (0, 1, 2)
+_HANDED_ON = (signal.SIGTERM, signal.SIGINT)
 _LENGTH = 8  # bytes that say how long a request is
 
 
@@ -92,9 +93,10 @@ def delegate(program: str, imports: str) -> int | None:
             return None
         asked = _Request(program, imports, sys.argv, str(Path.cwd()), dict(os.environ))
         request = json.dumps(asked).encode()
-        socket.send_fds(server, [len(request).to_bytes(_LENGTH)], _STREAMS)
-        server.sendall(request)
         with _passed_on(server):
+            socket.send_fds(server, [len(request).to_bytes(_LENGTH)], _STREAMS)
+            server.sendall(request)
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
             code = server.recv(2, socket.MSG_WAITALL)
     status = int.from_bytes(code, signed=True) if len(code) == 2 else -signal.SIGKILL
     if status < 0:
@@ -113,21 +115,23 @@ def _end_by(number: int) -> None:
 
 @contextmanager
 def _passed_on(server: socket.socket) -> Iterator[None]:
-    """Hands signals on to the stage, which is in a group of its own: each reaches it once."""
+    """Hands signals on to the stage, which is in a group of its own: each reaches it once.
+
+    They begin blocked: none can come before the request that it belongs to.
+    """
 
     def hand_on(number: int, _: object) -> None:
         with suppress(OSError):
             server.sendall(bytes([number]))
 
-    before = {
-        signal.SIGTERM: signal.signal(signal.SIGTERM, hand_on),
-        signal.SIGINT: signal.signal(signal.SIGINT, hand_on),
-    }
+    signal.pthread_sigmask(signal.SIG_BLOCK, _HANDED_ON)
+    before = {number: signal.signal(number, hand_on) for number in _HANDED_ON}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
 
 
 @dataclass

@@ -14,7 +14,8 @@ HEADER = struct.Struct("<4sQI")
 METHODS = ("sqp", "mma")
 
 Run = subprocess.Popen[str]
-Moment = Callable[[Checkout], bool]
+Moment = Callable[[Checkout, int], bool]
+"""Tells of a checkout, and the length of its journal before the run, whether to end it."""
 
 
 def records(journal: Path) -> list[bytes]:
@@ -77,16 +78,16 @@ def press_ctrl_c(run: Run, checkout: Checkout) -> None:
 
 
 def evaluated(count: int) -> Moment:
-    return lambda checkout: len(journal(checkout, "sqp")) > count
+    return lambda checkout, known: len(journal(checkout, "sqp")) > known + count
 
 
 def there_is(*patterns: str) -> Moment:
-    return lambda checkout: any(list(checkout.results.glob(pattern)) for pattern in patterns)
+    return lambda checkout, _: any(list(checkout.results.glob(pattern)) for pattern in patterns)
 
 
 ENDS: dict[str, tuple[Moment, Callable[[Run, Checkout], None]]] = {
     "early in an optimisation": (evaluated(2), kill_stage),
-    "later in it": (evaluated(5), press_ctrl_c),
+    "later in it": (evaluated(2), press_ctrl_c),
     "while a design is written": (there_is(".part_*_design_*.nc"), kill_everything),
     "while it is simulated": (there_is("logs/simulate.log", "logs/sweep_*.log"), kill_make),
     "while the report is drawn": (there_is("logs/report.log"), kill_everything),
@@ -99,7 +100,7 @@ def check_ends(moments: Iterable[str], undisturbed: Checkout, fresh: Checkout) -
         has_come, end = ENDS[moment]
         before = {method: journal(fresh, method) for method in METHODS}
         run = fresh.start()
-        wait_until(partial(has_come, fresh), run)
+        wait_until(partial(has_come, fresh, len(before["sqp"])), run)
         end(run, fresh)
         for method, known in before.items():
             assert journal(fresh, method)[: len(known)] == known, f"{moment}: evaluations lost"

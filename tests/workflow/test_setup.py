@@ -57,6 +57,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def set_up(folder: Path, *lock: str, offline: bool = True) -> subprocess.CompletedProcess[str]:
     """`make setup` with these lines of a lock."""
     (folder / "requirements.lock").write_text("".join(lock))
+    (folder / ".venv/requirements.lock").unlink(missing_ok=True)  # may be of the same moment
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("MAKE", "MFL", "PIP_", "UV_"))}
     return subprocess.run(
         ["make", "setup", *["WHEELS=wheels"] * offline, f"PYTHON={sys.executable}"],

@@ -190,8 +190,8 @@ def late():
 
 heavy = Heavy()
 atexit.register(print, "of the end")
-threading.Thread(target=late).start()
 print("not flushed", end="; ")
+threading.Thread(target=late).start()
 cli.leave(3)
 """
 

@@ -22,8 +22,8 @@ print("out of", Path.cwd().name, os.environ["COLOUR"], "server" in os.environ, s
 print("complains", file=sys.stderr)
 what = sys.argv[1]
 if what == "sleep":
-    Path("process").write_text(str(os.getpid()))
     try:
+        Path("process").write_text(str(os.getpid()))
         time.sleep(60)
     except KeyboardInterrupt:
         sys.exit(130)

@@ -79,9 +79,10 @@ def twice(folder: Path, script: str) -> tuple[list[str], list[str]]:
 
 def test_compiling_is_told_once_and_does_not_count_as_work(tmp_path: Path) -> None:
     first, second = twice(tmp_path, COUNT)
-    assert first[:-1] == ["compiling loops, once on this machine: up to a minute or two"]
+    assert first[0] == "compiling loops, once on this machine: up to a minute or two"
+    assert all(line.startswith("compiling: ") for line in first[1:-1])  # where it takes long
     passed, worked = map(float, first[-1].split())
-    assert worked < 0.1 * passed
+    assert worked < 0.5 * passed  # a pause of the machine beside the compiling counts as work
     assert len(second) == 1  # found in the cache
 
 

@@ -24,7 +24,8 @@ RUN = "from {} import outer as f; f(3); print(f(3), sum(f.stats.cache_misses.val
 
 
 def checkout(root: Path) -> Path:
-    shutil.copytree(ROOT / "sim/core", root / "sim/core")
+    sources = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(ROOT / "sim/core", root / "sim/core", ignore=sources)
     for face in ("__init__.py", "__init__.pyi"):
         shutil.copy(ROOT / "sim" / face, root / "sim" / face)
     for name, text in LOOPS.items():
