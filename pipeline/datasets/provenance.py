@@ -139,17 +139,26 @@ def instructions() -> str:
 
 @lru_cache(maxsize=1)
 def git_commit() -> str:
-    """The commit of the sources, or "unknown" outside a git checkout."""
+    """Names the commit of the sources, or "unknown" where they are no git checkout."""
     if INSTALLED:
         return "unknown"  # a folder above site-packages may be a checkout of something else
     if (ROOT / COMMIT_FILE).is_file():
         return (ROOT / COMMIT_FILE).read_text().strip()
-    command = ["git", "-C", str(ROOT), "rev-parse", "--verify", "HEAD"]
+    return checked_out(ROOT) or "unknown"
+
+
+def checked_out(root: Path) -> str:
+    """Asks git for the commit of the checkout whose top is this folder; "" where it is none.
+
+    A folder below the top may hold other sources than those of that repository.
+    """
+    command = ["git", "-C", str(root), "rev-parse", "--show-prefix", "HEAD"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
     except (OSError, subprocess.SubprocessError):
-        return "unknown"
-    return done.stdout.strip()
+        return ""
+    prefix, commit = done.stdout.splitlines()
+    return "" if prefix else commit
 
 
 def _json(value: object) -> str:

@@ -111,12 +111,19 @@ def check_sources(root: Path = ROOT) -> None:
     Studies may differ: the crate holds them as they are.
 
     Raises:
-        UserError: a file differs.
+        UserError: a file differs, or git cannot tell: there is no checkout, or it is a crate.
     """
+    if (root / provenance.COMMIT_FILE).exists() or not provenance.checked_out(root):
+        what = "git knows of no commit of these sources"
+        remedy = "publish from a clone of the repository: unpacked sources have no history"
+        raise UserError(what, file=root, remedy=remedy)
     names = [name for name in SOURCES if name != "experiments"]
     words = ["git", "-C", str(root), "status", "--porcelain", "--", *names]
-    told = subprocess.run(words, capture_output=True, text=True, check=False).stdout.splitlines()
-    if told:
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode:
+        what = f"git does not tell whether the sources are as committed: {done.stderr.strip()}"
+        raise UserError(what, file=root, remedy=f"see: git -C {root} status")
+    if told := done.stdout.splitlines():
         what = f"{len(told)} files of the sources are not as committed"
         remedy = "commit them (or set them aside: git stash -u), and build again"
         raise UserError(what, file=root / told[0][3:], remedy=remedy)

@@ -147,7 +147,8 @@ def test_sources_that_are_not_as_committed_are_refused(tmp_path: Path) -> None:
     for name in ("sim/a.py", "experiments/mine/problem.yaml"):
         (tmp_path / name).parent.mkdir(parents=True)
         (tmp_path / name).touch()
-    publish.check_sources(tmp_path)  # which has no history
+    with pytest.raises(UserError, match="no commit of these sources"):
+        publish.check_sources(tmp_path)
     words = ["git", "-C", str(tmp_path), "-c", "user.name=T", "-c", "user.email=t@localhost"]
     subprocess.run([*words, "init", "--quiet"], check=True)
     subprocess.run([*words, "add", "sim"], check=True)
@@ -157,6 +158,18 @@ def test_sources_that_are_not_as_committed_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="not as committed") as told:
         publish.check_sources(tmp_path)
     assert told.value.file == str(tmp_path / "sim/a.py")
+    (tmp_path / ".git/index").write_text("damaged")
+    with pytest.raises(UserError, match=r"git does not tell .*index"):
+        publish.check_sources(tmp_path)
+
+
+def test_the_sources_of_a_crate_are_not_published_again(tmp_path: Path) -> None:
+    words = ["git", "-C", str(tmp_path), "-c", "user.name=T", "-c", "user.email=t@localhost"]
+    subprocess.run([*words, "init", "--quiet"], check=True)
+    subprocess.run([*words, "commit", "--quiet", "--allow-empty", "--message", "One"], check=True)
+    (tmp_path / provenance.COMMIT_FILE).write_text("of the sources before they were changed\n")
+    with pytest.raises(UserError, match="no commit of these sources"):
+        publish.check_sources(tmp_path)
 
 
 def test_sources_and_place_are_checked_before_a_build(
