@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import stdtrit
 
+from pipeline.__main__ import run_stage
 from pipeline.calibration.experiments import force_displacement
 from pipeline.calibration.inputs import ELASTIC_NAMES, Constants, Population
 from pipeline.calibration.inputs.description import TestKind
@@ -22,6 +23,7 @@ from pipeline.calibration.population.curve_emulator import CurveEmulator
 from pipeline.calibration.population.sample_readings import SampleCurve
 from pipeline.problem.reading import load_section
 from pipeline.runtime import ROOT
+from pipeline.stages import validate
 from tests.tables import cases, refused
 
 FILE = ROOT / "experiments/validation/hinges.yaml"
@@ -254,3 +256,16 @@ def test_a_record_that_goes_to_and_fro_is_averaged() -> None:
     np.testing.assert_allclose(shown.force, 3.0 * shown.displacement, rtol=1e-9)
     once = cycles._replace(displacement=way[1:], force=way[1:])
     assert once.ascending(20) is once
+
+
+def test_the_stored_constants_name_the_files_that_they_were_drawn_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(validate, "draw_constants", lambda *_: np.ones((2, 3)))
+    out = tmp_path / "constants.csv"
+    assert run_stage("validate", ["constants", str(FILE), "--out", str(out), "--quiet"]) == 0
+    made, stored = (
+        [line for line in path.read_text().splitlines() if line.startswith("#")]
+        for path in (out, FILE.with_name(out.name))
+    )
+    assert stored == made
