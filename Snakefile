@@ -26,6 +26,12 @@ if workflow.is_main_process:
 rule_inputs.prepare_jobs(workflow.is_main_process)
 
 
+# Stands first: it is what snakemake makes where no target is named.
+rule no_target:
+    input:
+        rule_inputs.no_target,
+
+
 include: "pipeline/rules/targets.smk"
 include: "pipeline/rules/common.smk"
 include: "pipeline/rules/design.smk"

@@ -42,25 +42,26 @@ def parser(command: str, description: str, *, study: bool = True) -> argparse.Ar
 
     `study` tells whether it wants --problem and --preset.
     """
-    return _framed(f"python -m {command}", description, study=study)
+    return _framed(f"python -m {command}", description, (*(PROBLEM if study else ()), *_COMMON))
 
 
-def _framed(program: str, description: str, *, study: bool) -> argparse.ArgumentParser:
+def _framed(program: str, description: str, options: Iterable[Option]) -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog=program,
         description=description,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    _add(made, (*(PROBLEM if study else ()), *_COMMON))
+    _add(made, options)
     return made
 
 
 def command_line(stage: Stage) -> argparse.ArgumentParser:
     """Makes the command line of a stage from its row of the table."""
     does = f"{stage.does[0].upper()}{stage.does[1:]}."
-    study = stage.unused is not None and not stage.parts
-    made = _framed(f"{_PROGRAM} {stage.name}", f"{does}\n\n{stage.about}".strip(), study=study)
+    study = PROBLEM if stage.unused is not None and not stage.parts else ()
+    shared = (*study, *(() if stage.passes_on else _COMMON))
+    made = _framed(f"{_PROGRAM} {stage.name}", f"{does}\n\n{stage.about}".strip(), shared)
     for name in stage.inputs:
         made.add_argument(f"--{name}", type=Path, required=True, metavar="NC", help="to read")
     _add(made, stage.options)

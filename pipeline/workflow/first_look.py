@@ -8,20 +8,21 @@ from pathlib import Path
 
 from pipeline.runtime import PREFIX, WORK, UserError
 from pipeline.workflow.studies import Study, check_names, joints
+from pipeline.workflow.target_words import built_by
 
 
 def work(args: argparse.Namespace) -> None:
     """Shows one study.
 
     Raises:
-        UserError: the study, its preset or a recording has a name that none can have, or a figure
-            of several studies has it.
+        UserError: there is no such study or preset, it or a recording has a name that none can
+            have, or a figure of several studies has it.
     """
     if members := joints().get(args.study):
         remedy = f"check each by its own name: {', '.join(map(str, members))}"
         raise UserError("a figure of several studies", key="study", value=args.study, remedy=remedy)
-    study = Study.parse(args.study)
-    check_names(study)
+    check_names(Study.parse(args.study))
+    study = Study.parse(built_by(args.study))
     sys.exit(_show(study, WORK))
 
 

@@ -13,6 +13,8 @@ from pathlib import Path
 from pipeline.datasets import file_hash
 from pipeline.runtime import INSTALLED, ROOT, UserError
 from pipeline.workflow.runs import SNAKEMAKE
+from pipeline.workflow.studies import asked_for, problem_of
+from pipeline.workflow.target_words import check_words
 
 LOG = logging.getLogger(__name__)
 
@@ -53,11 +55,14 @@ def work(args: argparse.Namespace) -> None:
     """Builds twice and compares; both builds stay where they fail or differ.
 
     Raises:
-        UserError: a build fails, files differ, or there is no checkout.
+        UserError: nothing is named so, a build fails, files differ, or there is no checkout.
     """
     if INSTALLED:
         what = "what is built twice are the studies of a checkout, which an installed package lacks"
         raise UserError(what, remedy="clone the repository, and there: make reproduce STUDY=name")
+    check_words([args.target])
+    for study in asked_for([args.target]):
+        problem_of(study)
     place = Path(tempfile.mkdtemp(prefix="reproduce_"))
     LOG.info("building twice in %s, which stays if that fails", place)
     first, second = (_built(args.target, place / name) for name in ("first", "second"))

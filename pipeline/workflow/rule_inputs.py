@@ -12,6 +12,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import NamedTemporaryFile
+from typing import NoReturn
 
 from snakemake.iocontainers import Wildcards
 
@@ -35,13 +36,11 @@ from pipeline.workflow.studies import (
     check_calibrations,
     check_names,
     check_targets,
-    check_words,
-    names_target,
     problem_of,
-    studies,
     targets,
     together,
 )
+from pipeline.workflow.target_words import check_words, studies_told
 
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
@@ -142,10 +141,8 @@ def figure_hash(wildcards: Wildcards) -> str:
     return hashlib.sha256(described.encode()).hexdigest()
 
 
-def check_problems(words: Collection[str]) -> None:
+def check_problems(words: Sequence[str]) -> None:
     """Ends the process with one clear message if a study that is asked for has a faulty problem.
-
-    Where no target is named, the first study is meant: it is the default target.
 
     Snakemake would only find no rule to make its files, and count those that exist as up to date.
     """
@@ -154,13 +151,17 @@ def check_problems(words: Collection[str]) -> None:
         if any("calibrat" in word for word in words):
             check_calibrations()
         check_words(words)
-        first = [] if any(map(names_target, words)) else studies()[:1]
-        for study in asked_for(words) or first:
+        for study in asked_for(words):
             check_names(study)
             check_measured_constants(problem_of(study), WORK / "experiments" / study.name)
         check_products(words)
     except UserError as error:
         sys.exit(f"error: {error}")
+
+
+def no_target(_: Wildcards) -> NoReturn:
+    """Ends the process where no target is named: there is none that everyone wants."""
+    sys.exit(f"error: nothing to build\n  remedy: {studies_told()}")
 
 
 def check_room(folder: str) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -144,7 +143,7 @@ def asked_for(words: Collection[str]) -> list[Study]:
     names = {study.name for study in by_target.values()}
     several = together()
     words = [*words, *(figures() if ALL in words else ())]
-    words = [_without_product(word) for word in words]
+    words = [without_product(word) for word in words]
     found = [study for word in words for study in several.get(word, ())]
     for word in words:
         study = by_target.get(word) or Study.parse(word.removeprefix("results/").partition("/")[0])
@@ -153,29 +152,8 @@ def asked_for(words: Collection[str]) -> list[Study]:
     return found
 
 
-def check_words(words: Collection[str]) -> None:
-    """Refuses a word of a command that is near a target, and names nothing itself.
-
-    Words that are near none may be those of options.
-
-    Raises:
-        UserError: naming the targets that may be meant.
-    """
-    known = {*targets(), *_rule_names()}
-    for word in filter(names_target, words):
-        plain = _without_product(word)
-        of_study = Study.parse(plain).name in known
-        if not of_study and (near := get_close_matches(plain, known, n=3, cutoff=0.75)):
-            remedy = f"did you mean {' or '.join(near)}?"
-            raise UserError(f"nothing is named {word}", key="target", value=word, remedy=remedy)
-
-
-def names_target(word: str) -> bool:
-    """Tells a word that may be a target's, and is no option, number or file."""
-    return re.fullmatch(r"[A-Za-z]\w*(@[\w.]*)?", word) is not None
-
-
-def _without_product(word: str) -> str:
+def without_product(word: str) -> str:
+    """Cuts the end of a product's target off; a word without one stays."""
     return next((word.removesuffix(end) for end in PRODUCTS if word.endswith(end)), word)
 
 
@@ -262,7 +240,7 @@ def _definition(study: Study, root: Path) -> Path:
 
 def _reserved() -> dict[str, str]:
     """Maps names that no study can have to what has them."""
-    rules = dict.fromkeys(_rule_names(), "a rule of the workflow")
+    rules = dict.fromkeys(rule_names(), "a rule of the workflow")
     return dict.fromkeys(_make_targets(), "a command of make") | rules
 
 
@@ -275,7 +253,7 @@ def _make_targets() -> tuple[str, ...]:
 
 
 @cache
-def _rule_names() -> tuple[str, ...]:
+def rule_names() -> tuple[str, ...]:
     """Lists the names of the rules, and of the folders of results that are no study's."""
     text = "".join(path.read_text() for path in sorted((ROOT / "pipeline/rules").glob("*.smk")))
     found = re.findall(r"^rule (\w+):|\bresults/(\w+)/", text, flags=re.MULTILINE)

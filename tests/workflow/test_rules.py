@@ -205,6 +205,15 @@ def test_faulty_problem_is_one_message_even_if_results_exist(built: Sandbox) -> 
         assert "Traceback" not in ended.stderr
 
 
+def test_a_run_without_a_target_names_those_that_there_are(sandbox: Sandbox) -> None:
+    for words in ([], ["--dry-run"]):
+        ended = sandbox.run(*words)
+        assert ended.returncode == 1
+        assert "error: nothing to build\n  remedy: name a target: fig2, fig3" in ended.stderr
+        assert "Nothing to be done" not in ended.stderr
+        assert "Exception" not in ended.stderr
+
+
 def test_measured_constants_are_read_before_anything_runs(sandbox: Sandbox) -> None:
     asked = yaml.safe_load(sandbox.problem.read_bytes())["report"]["measured_constants"]["file"]
     constants = sandbox.problem.parent / asked

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pipeline.problem.reading import joint_figure
-from pipeline.runtime import ROOT, UserError
+from pipeline.runtime import ROOT
 from pipeline.workflow import studies
+from pipeline.workflow.target_words import built_by
 
 
 @dataclass(frozen=True)
@@ -24,9 +25,7 @@ class Publication:
         Raises:
             UserError: it builds nothing, or a problem is faulty.
         """
-        if (target := studies.targets().get(word)) is None:
-            studies.problem_of(studies.Study.parse(word))  # tells which part of it there is not
-            raise UserError("no study or figure has this name", key="target", value=word)
+        target = built_by(word)
         members = tuple(studies.together().get(target) or [studies.Study.parse(target)])
         for study in members:
             studies.problem_of(study)

@@ -10,6 +10,7 @@ from pipeline.__main__ import main, overview
 from pipeline.datasets.tables import TABLES
 from pipeline.problem import Problem
 from pipeline.runtime import ROOT, STAGES, Stage
+from pipeline.runtime.cli import command_line
 
 HEAVY = ("jax", "numba", "numpy", "pydantic", "xarray", "yaml", "cv2", "matplotlib")
 
@@ -45,6 +46,13 @@ def test_help_loads_nothing_heavy(words: list[str]) -> None:
     told = subprocess.check_output([sys.executable, "-c", script, *words], text=True)
     assert told.endswith("loaded []\n")
     assert "usage: python -m pipeline" in told
+
+
+def test_the_help_of_what_passes_its_words_on_has_no_option_of_ours() -> None:
+    told = {name: command_line(STAGES[name]).format_help() for name in ("run", "check")}
+    assert "--quiet" in told["check"]
+    assert "--quiet" not in told["run"]
+    assert "--log" not in told["run"]
 
 
 def test_a_stage_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,14 +2,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.__main__ import run_stage
 from pipeline.runtime import UserError
-from pipeline.workflow import rule_inputs
 from pipeline.workflow.studies import (
-    Study,
     check_calibrations,
     check_targets,
-    check_words,
     families,
     joints,
 )
@@ -84,34 +80,3 @@ def test_a_calibration_with_an_odd_name(tmp_path: Path) -> None:
     (folder / "my fit-2.yaml").touch()
     with refused("name of a calibration", remedy="name it my_fit_2"):
         check_calibrations(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("word", "near"), [("fig2x", "fig2"), ("fig2_qick", "fig2_quick"), ("indx", "index")]
-)
-def test_a_mistyped_target_is_told_with_what_is_near(word: str, near: str) -> None:
-    with refused(f"nothing is named {word}", "target", f"did you mean {near}"):
-        check_words(["--dry-run", word])
-
-
-def test_what_may_be_an_option_or_a_file_is_left_alone() -> None:
-    """And targets, rules, products; a preset that is unknown is told by its problem file."""
-    targets = ["fig2", "fig6@quick", "fig2_quick", "index", "all", "fig2_sweep", "fig2@qick"]
-    check_words([*targets, "-n", "--cores", "4", "slurm", "results/fig2x/report/index.html"])
-
-
-def test_a_figure_of_several_names_its_studies(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_stage("check", ["fig6"]) == 2
-    assert "check each by its own name: fig6_heart" in capsys.readouterr().err
-
-
-def test_a_mistyped_target_is_not_blamed_on_the_first_study(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    read: list[Study] = []
-    monkeypatch.setattr(rule_inputs, "check_names", read.append)
-    monkeypatch.setattr(rule_inputs, "check_measured_constants", lambda *_: None)
-    rule_inputs.check_problems(["nothing_alike"])
-    assert read == []
-    rule_inputs.check_problems(["--cores", "4"])
-    assert len(read) == 1
