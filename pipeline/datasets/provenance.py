@@ -144,10 +144,10 @@ def git_commit() -> str:
         return "unknown"  # a folder above site-packages may be a checkout of something else
     if (ROOT / COMMIT_FILE).is_file():
         return (ROOT / COMMIT_FILE).read_text().strip()
-    return checked_out(ROOT) or "unknown"
+    return head_commit(ROOT) or "unknown"
 
 
-def checked_out(root: Path) -> str:
+def head_commit(root: Path) -> str:
     """Asks git for the commit of the checkout whose top is this folder; "" where it is none.
 
     A folder below the top may hold other sources than those of that repository.

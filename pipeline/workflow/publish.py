@@ -113,7 +113,7 @@ def check_sources(root: Path = ROOT) -> None:
     Raises:
         UserError: a file differs, or git cannot tell: there is no checkout, or it is a crate.
     """
-    if (root / provenance.COMMIT_FILE).exists() or not provenance.checked_out(root):
+    if (root / provenance.COMMIT_FILE).exists() or not provenance.head_commit(root):
         what = "git knows of no commit of these sources"
         remedy = "publish from a clone of the repository: unpacked sources have no history"
         raise UserError(what, file=root, remedy=remedy)

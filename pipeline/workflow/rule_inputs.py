@@ -40,7 +40,7 @@ from pipeline.workflow.studies import (
     targets,
     together,
 )
-from pipeline.workflow.target_words import check_words, studies_told
+from pipeline.workflow.target_words import available_targets, check_words
 
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
@@ -161,7 +161,7 @@ def check_problems(words: Sequence[str]) -> None:
 
 def no_target(_: Wildcards) -> NoReturn:
     """Ends the process where no target is named: there is none that everyone wants."""
-    sys.exit(f"error: nothing to build\n  remedy: {studies_told()}")
+    sys.exit(f"error: nothing to build\n  remedy: {available_targets()}")
 
 
 def check_room(folder: str) -> None:

@@ -56,7 +56,7 @@ def built_by(word: str) -> str:
     raise _unknown("no study or figure", word, _near(word, known))
 
 
-def studies_told() -> str:
+def available_targets() -> str:
     """Tells which studies and figures can be built, as a remedy."""
     names = sorted({Study.parse(built).name for built in targets().values()})
     told = f"name a target: {', '.join(names)}"
@@ -64,7 +64,7 @@ def studies_told() -> str:
 
 
 def _unknown(what: str, word: str, near: Sequence[str]) -> UserError:
-    remedy = f"did you mean {' or '.join(near)}?" if near else studies_told()
+    remedy = f"did you mean {' or '.join(near)}?" if near else available_targets()
     return UserError(f"{what} is named {word}", key="target", value=word, remedy=remedy)
 
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from pipeline.problem.reading import joint_figure
 from pipeline.runtime import ROOT
-from pipeline.workflow import studies
-from pipeline.workflow.target_words import built_by
+from pipeline.workflow import studies, target_words
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,7 @@ class Publication:
         Raises:
             UserError: it builds nothing, or a problem is faulty.
         """
-        target = built_by(word)
+        target = target_words.built_by(word)
         members = tuple(studies.together().get(target) or [studies.Study.parse(target)])
         for study in members:
             studies.problem_of(study)

@@ -42,11 +42,11 @@ def test_no_commit_outside_a_checkout(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_the_commit_of_a_repository_around_the_sources_is_none_of_theirs(tmp_path: Path) -> None:
     words = ["git", "-C", str(tmp_path), "-c", "user.name=T", "-c", "user.email=t@localhost"]
     subprocess.run([*words, "init", "--quiet"], check=True)
-    assert provenance.checked_out(tmp_path) == ""  # nothing is committed yet
+    assert provenance.head_commit(tmp_path) == ""  # nothing is committed yet
     subprocess.run([*words, "commit", "--quiet", "--allow-empty", "--message", "One"], check=True)
-    assert len(provenance.checked_out(tmp_path)) >= 40
+    assert len(provenance.head_commit(tmp_path)) >= 40
     (tmp_path / "own/cloak").mkdir(parents=True)
-    assert provenance.checked_out(tmp_path / "own/cloak") == ""
+    assert provenance.head_commit(tmp_path / "own/cloak") == ""
 
 
 def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
