@@ -6,11 +6,13 @@ these variables once, when they are imported, so `pipeline` sets them on its own
 """
 
 import os
+from contextlib import suppress
+from pathlib import Path
 
 import platformdirs
 
 from pipeline.runtime.locations import CACHE
-from sim.core import instruction_set
+from sim.core import TEMPORARY_NAME, instruction_set, make_temporary_folder
 
 RUN_MARK = "METACLOAK_RUN"
 """Names folder and run (FOLDER:NUMBER on HOST) in the environment of all jobs."""
@@ -31,8 +33,6 @@ BOUNDED = {
     "OPENCV_IO_MAX_IMAGE_PIXELS": str(1 << 27),  # of a picture: more are refused, not allocated
 }
 CACHES = {
-    # found by content, so from any checkout
-    "JAX_COMPILATION_CACHE_DIR": str(platformdirs.user_cache_path("metacloak") / "jax"),
     "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
     "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
     "MPLCONFIGDIR": str(CACHE / "matplotlib"),
@@ -45,5 +45,29 @@ def pin() -> None:
     if instruction_set.can_pin():
         os.environ.update(instruction_set.LIBRARIES)
         os.environ["XLA_FLAGS"] += f" {instruction_set.XLA_FLAG}"
-    for name, value in CACHES.items():
+    _give_caches_a_home()
+    # found by content, so from any checkout
+    jax = {"JAX_COMPILATION_CACHE_DIR": str(platformdirs.user_cache_path("metacloak") / "jax")}
+    for name, value in (CACHES | jax).items():
         os.environ.setdefault(name, value)
+
+
+def _give_caches_a_home() -> None:
+    """Names a folder below TMPDIR for all caches of the user, where theirs cannot be written.
+
+    The machine that submitted this job may have named one, which is not looked for on this one.
+    """
+    for name in ("XDG_CACHE_HOME", "JAX_COMPILATION_CACHE_DIR"):
+        if TEMPORARY_NAME in Path(os.environ.get(name, "")).parts:
+            del os.environ[name]
+    if not _can_be_written(platformdirs.user_cache_path()):
+        with suppress(OSError):
+            os.environ["XDG_CACHE_HOME"] = str(make_temporary_folder())
+
+
+def _can_be_written(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK | os.X_OK)

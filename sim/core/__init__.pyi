@@ -17,3 +17,5 @@ from .import_graph import import_closure as import_closure
 from .import_graph import locate as locate
 from .outlined import address_of as address_of
 from .outlined import call_at as call_at
+from .temporary_folder import TEMPORARY_NAME as TEMPORARY_NAME
+from .temporary_folder import make_temporary_folder as make_temporary_folder

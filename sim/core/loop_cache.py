@@ -12,7 +12,6 @@ import hashlib
 import logging
 import os
 import pickle
-import stat
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -26,6 +25,7 @@ from numba.core.caching import FunctionCache, _CacheLocator
 
 from sim.core.import_graph import file_closure
 from sim.core.instruction_set import LEVEL, can_pin
+from sim.core.temporary_folder import make_temporary_folder
 
 LOG = logging.getLogger(__name__)
 
@@ -134,21 +134,7 @@ def cache_folders() -> Iterator[Path]:
     """Lists that folder and, where it cannot be written, one of the user's for temporary files."""
     yield cache_folder()
     with suppress(OSError):
-        yield _temporary_folder()
-
-
-def _temporary_folder() -> Path:
-    """Makes a folder that only this user can write: what lies there is run.
-
-    Raises:
-        OSError: it cannot be made, or others may have written there.
-    """
-    folder = Path(tempfile.gettempdir(), f"metacloak-{os.getuid()}")
-    folder.mkdir(mode=0o700, exist_ok=True)
-    found = folder.lstat()
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
-        raise PermissionError(f"others can write {folder}")
-    return folder / "loops"
+        yield make_temporary_folder() / "loops"
 
 
 def install() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from pipeline.runtime import ROOT
-from sim.core import import_closure
+from sim.core import TEMPORARY_NAME, import_closure
 from sim.core.loop_cache import loop_hash
 
 MARCH = "sim.quasistatics.equilibrium_path"
@@ -76,7 +76,7 @@ def test_a_folder_that_cannot_be_written_is_replaced_by_one_for_temporary_files(
 @pytest.mark.parametrize("way", ["others may write it", "link"])
 def test_code_that_others_may_have_written_is_not_run(tmp_path: Path, way: str) -> None:
     root, spare = checkout(tmp_path / "checkout"), tmp_path / "spare"
-    own = spare / f"metacloak-{os.getuid()}"
+    own = spare / TEMPORARY_NAME
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     spare.mkdir()
     if way == "link":
