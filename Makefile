@@ -8,7 +8,7 @@ PAGES := all fig1 index movies calibrate validation benchmark any_load
 PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains certificate front,$(addsuffix _$(product),$(STUDIES)))
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
-INSTALL = $(BIN)/python pipeline/workflow/install_lock.py $(if $(WHEELS),--wheels "$(abspath $(WHEELS))")
+INSTALL = $(BIN)/python pipeline/workflow/install_lock.py $(if $(WHEELS),--wheels "$(WHEELS)")
 PYTEST ?= -n auto --dist loadscope --no-loadscope-reorder --ignore tests/clients --ignore tests/cluster --ignore tests/slow -m 'not slow'
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)

@@ -51,6 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(ROOT / script, folder / script)
     shutil.copy(ROOT / "Makefile", folder)
     (folder / "wheels").mkdir()
+    (folder / "USB stick").symlink_to("wheels")
     return folder
 
 
@@ -60,7 +61,7 @@ def set_up(folder: Path, *lock: str, offline: bool = True) -> subprocess.Complet
     (folder / ".venv/requirements.lock").unlink(missing_ok=True)  # may be of the same moment
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("MAKE", "MFL", "PIP_", "UV_"))}
     return subprocess.run(
-        ["make", "setup", *["WHEELS=wheels"] * offline, f"PYTHON={sys.executable}"],
+        ["make", "setup", *["WHEELS=USB stick"] * offline, f"PYTHON={sys.executable}"],
         cwd=folder,
         env=kept | {"PIP_CONFIG_FILE": str(folder / "pip.conf")},
         capture_output=True,
