@@ -108,7 +108,7 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
     """Reads the named columns (lines, names) in working units, of at least so many lines.
 
     The heading names every column as `NAME (UNIT)` or `NAME / UNIT`, or the units stand in the
-    line below the names; lines above it are comments.
+    line below the names, with or without brackets; lines above it are comments.
 
     Raises:
         UserError: no such file or column, no unit or a wrong one, too few lines, or a line without
@@ -119,8 +119,11 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
     cells = read_cells(path)
     cells = cells._replace(rows=_with_units_below(cells.rows))
     heading, named = _heading(cells.rows, list(wanted), path)
+    if bare := _bare_units(cells.rows[heading:], named, wanted):
+        cells.rows[heading] = []
     titles = {name: cells.rows[heading - 1][named[name]] for name in wanted}
-    factors = [_factor(_unit(titles[name]), wanted[name], name, path) for name in wanted]
+    told = {name: _unit(title) or bare.get(name) for name, title in titles.items()}
+    factors = [_factor(told[name], wanted[name], name, path) for name in wanted]
     lines = [(number, row) for number, row in enumerate(cells.rows, 1) if any(row)]
     lines = [(number, row) for number, row in lines if number > heading]
     if len(lines) < least:
@@ -154,6 +157,16 @@ def _with_units_below(rows: list[list[str]]) -> list[list[str]]:
             ]
             found[line + 1] = []
     return found
+
+
+def _bare_units(
+    below: list[list[str]], named: Mapping[str, int], wanted: Mapping[str, units.Dimension]
+) -> dict[str, str]:
+    """Reads units without brackets in the first of these lines; none where one is no unit."""
+    first = below[0] if below else []
+    found = {name: first[named[name]] for name in wanted if named[name] < len(first)}
+    found = {name: unit for name, unit in found.items() if unit}
+    return found if all(_is_unit(unit, wanted[name]) for name, unit in found.items()) else {}
 
 
 def _heading(
@@ -202,10 +215,12 @@ def _is_unit(word: str, dimension: units.Dimension) -> bool:
 
 def _factor(unit: str | None, dimension: units.Dimension, name: str, path: Path) -> float:
     """Computes how many working units a column's unit is."""
-    remedy = f"write the heading as {name} ({dimension.unit}), with the unit of the numbers"
+    heading = f"write the heading as {name} ({dimension.unit})"
     if unit is None:
+        remedy = f"{heading}, with the unit of the numbers"
         raise UserError("the unit of the column is missing", file=path, key=name, remedy=remedy)
     try:
         return units.parse_quantity(f"1 {unit}", dimension)
     except UserError as error:
+        remedy = f"convert the numbers to {dimension.unit}, and {heading}"
         raise UserError(error.what, file=path, key=name, value=unit, remedy=remedy) from error

@@ -34,6 +34,8 @@ minute = 60 * second = min
 inch = 0.0254 * meter = in
 hertz = 1 / second = Hz
 newton = 1000 * gram * meter / second ** 2 = N
+gram_force = 9.80665e-3 * newton = gf
+pound_force = 4.4482216152605 * newton = lbf
 pascal = newton / meter ** 2 = Pa
 joule = newton * meter = J
 """

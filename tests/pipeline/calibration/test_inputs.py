@@ -36,6 +36,40 @@ def test_units_of_columns_are_minded(tmp_path: Path) -> None:
     np.testing.assert_allclose(found[0], [20.0, 1000.0])
 
 
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "displacement,force,note\ncm,kN,none of ours",
+        "displacement,force\n(cm),(kN)",
+        "displacement,force (kN)\ncm",
+        "displacement / cm,force\n,kN",
+    ],
+)
+def test_units_may_stand_in_the_line_below_the_names(heading: str, tmp_path: Path) -> None:
+    path = tmp_path / "readings.csv"
+    path.write_text(f"{heading}\n{ROWS}\n")
+    found = csv_columns.read_quantities(path, WANTED, least=7)
+    np.testing.assert_allclose(found[0], [10.0, 2000.0])
+    assert len(found) == 7
+
+
+@pytest.mark.parametrize(
+    ("unit", "newtons"), [("lbf", 4.4482216), ("kgf", 9.80665), ("gf", 9.80665e-3)]
+)
+@pytest.mark.parametrize("form", ["displacement (mm),force ({})", "displacement,force\nmm,{}"])
+def test_forces_are_read_in_weights(form: str, unit: str, newtons: float, tmp_path: Path) -> None:
+    path = tmp_path / "readings.csv"
+    path.write_text(f"{form.format(unit)}\n{ROWS}\n")
+    np.testing.assert_allclose(csv_columns.read_quantities(path, WANTED)[0], [1.0, 2 * newtons])
+
+
+@pytest.mark.parametrize("heading", ["displacement (mm),force (ozf)", "displacement,force\nmm,ozf"])
+def test_numbers_in_an_unknown_unit_are_to_be_converted(heading: str, tmp_path: Path) -> None:
+    error = refusal(f"{heading}\n{ROWS}\n", tmp_path)
+    assert error.what == "unknown unit 'ozf'"
+    assert error.remedy == "convert the numbers to N, and write the heading as force (N)"
+
+
 @pytest.mark.parametrize("comment", ["# Zwick; compression\tof s1", "Operator; Meier\ttoday"])
 def test_a_separator_in_a_comment_is_none(comment: str, tmp_path: Path) -> None:
     path = tmp_path / "readings.csv"

@@ -53,8 +53,8 @@ def test_units_of_a_log_are_those_of_its_heading(tmp_path: Path) -> None:
         np.testing.assert_allclose(found.force, plain.force)
     with refused("is not that of a force", "Load"):
         load_cell.read(log(tmp_path, "Time (s),Load (mm)\n0.1,20\n"), cell)
-    with refused("unknown unit 'lbf'", "Load"):
-        load_cell.read(log(tmp_path, "Time,Load\ns,lbf\n0.1,20\n"), cell)
+    with refused("unknown unit 'ozf'", "Load", "convert the numbers to N"):
+        load_cell.read(log(tmp_path, "Time,Load\ns,ozf\n0.1,20\n"), cell)
 
 
 @cases("tracking", "time, force")
