@@ -23,7 +23,9 @@ MOTION, LOADING, UNLOADING = range(3)
 _LEAST_OVERLAP = 0.5  # of the shorter course
 _PER_FRAME = 2  # lags tried
 _STEPS = 12  # of refinement
-_RIVAL = 0.02  # of the correlation: a lag that is as good as the best
+_NEAR = 0.1  # of the correlation: lags that a finer look may find to be the best
+_LIKELY = 9.0  # times the variance, what three standard deviations add: a lag as good
+_ALIKE = 1e-4  # of the mean square: courses that differ by less are the same
 _BEYOND = 0.005  # of the nominal range: still its end
 _LEAST_RANGE = 0.05  # of the nominal range: a drive that moves
 _DENSER = 20  # samples of a path that is inverted, for each of its own
@@ -50,8 +52,10 @@ class SampledMotion:
 
     def at(self, time: Floats) -> Floats:
         """Evaluates (times, channels) a cubic spline through the samples, NaN after the last."""
-        inside = np.clip(time, self.time[0], self.time[-1])
-        return np.where((time <= self.time[-1])[:, None], self._spline(inside), np.nan)
+        out = np.where((time <= self.time[-1])[:, None], self.value[0], np.nan)
+        inside = (time > self.time[0]) & (time <= self.time[-1])
+        out[inside] = self._spline(time[inside])
+        return out
 
     @cached_property
     def _spline(self) -> CubicSpline:
@@ -74,10 +78,7 @@ def find_lag(measured: SampledMotion, nominal: SampledMotion) -> Lag:
             key="frame_rate",
             remedy="give the recording the rate at which they were taken, and track it again",
         )
-    tried = _lags(held, nominal)
-    found = np.array([_correlation(held, nominal, lag) for lag in tried])
-    place, ambiguous = _best(tried, found)
-    lag = _refined(held, nominal, tried[place])
+    lag, ambiguous = _best(held, nominal)
     correlation = _correlation(held, nominal, lag)
     if correlation < LEAST_CORRELATION:
         raise UserError(
@@ -111,14 +112,23 @@ def _lags(measured: SampledMotion, nominal: SampledMotion) -> Floats:
     return np.arange(first, last, interval / _PER_FRAME)
 
 
-def _best(tried: Floats, found: Floats) -> tuple[int, bool]:
-    """Finds the peak of the correlation nearest to no lag among those as good as the best."""
+def _best(measured: SampledMotion, nominal: SampledMotion) -> tuple[float, bool]:
+    """Finds the lag, s, and whether others are as good, of which it is the nearest to none.
+
+    As good are those whose residual exceeds that of the best by no more than noise allows.
+    """
+    tried = _lags(measured, nominal)
+    found = np.array([_correlation(measured, nominal, lag) for lag in tried])
     inner = np.concatenate([[-np.inf], found, [-np.inf]])
     peak = np.flatnonzero((found >= inner[:-2]) & (found >= inner[2:]))
-    good = peak[found[peak] > found.max() - _RIVAL]
-    best = peak[np.argmax(found[peak])]
-    ambiguous = len(good) > 1
-    return int(good[np.argmin(np.abs(tried[good]))] if ambiguous else best), ambiguous
+    near = peak[found[peak] > found.max() - _NEAR]
+    lags = np.array([_refined(measured, nominal, lag) for lag in tried[near]])
+    left = np.array([1 - _correlation(measured, nominal, lag) ** 2 for lag in lags])
+    rest, _ = _residual(measured, nominal, lags[left.argmin()])
+    allowed = left.min() * (1 + _LIKELY * _inflation(rest) / rest.size)
+    good = lags[left <= np.fmax(allowed, left.min() + _ALIKE)]
+    nearest = good[np.argmin(np.abs(good))]
+    return float(nearest), bool(np.ptp(good) > np.ptp(tried[:2]))
 
 
 def _pair(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[Floats, Floats]:
@@ -152,13 +162,19 @@ def _refined(measured: SampledMotion, nominal: SampledMotion, lag: float) -> flo
 def _fit(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[float, float, float]:
     """Fits the lag's uncertainty, the gain and its uncertainty, by least squares about the lag."""
     step = 1e-3 * float(np.median(np.diff(measured.time)))
-    first, last = _pair(measured, nominal, lag)
+    _, last = _pair(measured, nominal, lag)
     sooner, later = (nominal.at(measured.time - lag + shift) for shift in (step, -step))
-    gain = float(np.sum(first * last) / np.sum(last**2))
-    rest = first - gain * last
+    rest, gain = _residual(measured, nominal, lag)
     variance = float(np.mean(rest**2)) * _inflation(rest)
     steep = float(np.nansum((gain * (sooner - later) / (2 * step)) ** 2))
     return np.sqrt(variance / steep), gain, np.sqrt(variance / float(np.sum(last**2)))
+
+
+def _residual(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[Floats, float]:
+    """Computes what a gain on the nominal course leaves (frames, channels), and the gain."""
+    first, last = _pair(measured, nominal, lag)
+    gain = float(np.sum(first * last) / np.sum(last**2))
+    return first - gain * last, gain
 
 
 def _inflation(rest: Floats) -> float:

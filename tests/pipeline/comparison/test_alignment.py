@@ -83,11 +83,34 @@ def test_a_steady_vibration_is_said_to_be_ambiguous() -> None:
     assert not find_lag(filmed(0.2), NOMINAL).ambiguous
 
 
+@pytest.mark.parametrize(("ramp", "periods"), [(0, 30), (2, 10), (3, 9)])
+def test_a_period_off_is_not_as_good_where_noise_is_small(ramp: int, periods: int) -> None:
+    def course(time: np.ndarray) -> np.ndarray:
+        grown = np.tanh(2 * time / ramp) if ramp else 1.0
+        return np.where(time > 0, 4.5 * grown * np.sin(4 * np.pi * time), 0.0)[:, None]
+
+    end = periods / 2
+    nominal = SampledMotion(*(each(np.linspace(0, end, 40 * periods)) for each in (abs, course)))
+    time = np.arange(0.0, end, 1 / RATE)
+    noise = np.random.default_rng(0).normal(0.0, 0.007, (len(time), 1))
+    found = find_lag(SampledMotion(time, course(time - 0.7) + noise), nominal)
+    assert found.value == pytest.approx(0.7, abs=0.01 / RATE)
+    assert not found.ambiguous
+
+
+def test_noise_does_not_hide_that_a_steady_vibration_is_ambiguous() -> None:
+    time = np.arange(60) / RATE
+    noise = np.random.default_rng(0).normal(0.0, 0.05, (60, 2))
+    assert find_lag(SampledMotion(time, sine(time + 0.48) + noise), NOMINAL).ambiguous
+
+
 def test_other_frequencies_and_too_few_frames_are_refused() -> None:
     time = np.arange(90) / RATE
     other = SampledMotion(time, sine(2.7 * time))
     with pytest.raises(UserError, match=r"cannot be aligned[\s\S]*correlation"):
         find_lag(other, NOMINAL)
+    with pytest.raises(UserError, match="cannot be aligned"):
+        find_lag(SampledMotion(time, np.zeros((90, 2))), NOMINAL)
     with pytest.raises(UserError, match="too few frames"):
         find_lag(filmed(0.0, frames=7), NOMINAL)
     with pytest.raises(UserError, match="too few frames"):
