@@ -58,6 +58,18 @@ class SampledMotion:
         return out
 
     @cached_property
+    def moments(self) -> tuple[Floats, Floats, Floats]:
+        """Sums the first 0, 1, ... samples less the mean of all, and their squares.
+
+        These follow the samples less that mean: (n, channels), (n + 1, channels), (n + 1,).
+        """
+        centred = self.value - self.value.mean(axis=0)
+        square = np.sum(centred**2, axis=1)
+        total = np.zeros((len(centred) + 1, centred.shape[1]))
+        total[1:] = np.cumsum(centred, axis=0)
+        return centred, total, np.concatenate([[0.0], np.cumsum(square)])
+
+    @cached_property
     def _spline(self) -> CubicSpline:
         return CubicSpline(self.time, self.value)
 
@@ -140,9 +152,18 @@ def _pair(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[
 
 
 def _correlation(measured: SampledMotion, nominal: SampledMotion, lag: float) -> float:
-    first, last = _pair(measured, nominal, lag)
-    size = np.sqrt(np.sum(first**2) * np.sum(last**2))
-    return float(np.sum(first * last) / size) if size > 0 else 0.0
+    """Correlates the courses; those frames alone are gone through in which the nominal one moves."""
+    ends = nominal.time[[0, -1]]
+    first, n = np.searchsorted(measured.time, lag + ends, side="right")
+    if n == 0:
+        return 0.0
+    centred, total, square = measured.moments
+    moved = nominal.at(np.minimum(measured.time[first:n] - lag, ends[1])) - nominal.value[0]
+    sums = moved.sum(axis=0)
+    spread = np.sum(moved**2) - np.sum(sums**2) / n
+    size = np.sqrt(max(spread * (square[n] - np.sum(total[n] ** 2) / n), 0.0))
+    product = np.sum(moved * centred[first:n]) - np.sum(sums * total[n]) / n
+    return float(product / size) if size > 0 else 0.0
 
 
 def _refined(measured: SampledMotion, nominal: SampledMotion, lag: float) -> float:

@@ -15,6 +15,7 @@ from pipeline.tracking.output import distinct_frames, drive_displacement, driven
 from sim.core import Floats, Ints, Mask
 
 MOST_FRAMES = 600
+LEAST_PER_PERIOD = 8
 COMPARED, HELD, PUSHED, ABSENT, LOST = range(5)
 
 _SEEN = 0.5  # of the frames, or a unit counts as lost
@@ -40,11 +41,26 @@ class Measurement(NamedTuple):
         """Tells the units (n_units,) that are compared."""
         return np.asarray(self.use == COMPARED)
 
+    def taken(self, kept: Ints) -> "Measurement":
+        """Selects frames (n,) of those that are compared."""
+        displacement = self.displacement[kept]
+        return self._replace(
+            frames=self.frames[kept],
+            time=self.time[kept],
+            displacement=displacement,
+            sigma=self.sigma[kept],
+            use=_lose(displacement, np.where(self.use == LOST, COMPARED, self.use)),
+            drive=self.drive[kept],
+            force=self.force[kept],
+        )
+
 
 def prepare_measurement(
     track: xr.Dataset, design: xr.Dataset, leading: Ints | None = None
 ) -> Measurement:
     """Prepares the measured side of a comparison: a track, and the design as built.
+
+    Its frames are all but duplicates.
 
     The units `leading` are those whose displacement is the drive's; by default all that are driven.
 
@@ -56,7 +72,7 @@ def prepare_measurement(
     found = register(centre, measure_places(track, centre))
     motion = found.upright(track["displacement"].values.astype(float))
     turned = track.assign(displacement=(track["displacement"].dims, motion))
-    frames = select_frames(track)
+    frames = distinct_frames(track)
     shown = turned.isel(time=frames)
     displacement = shown["displacement"].values
     return Measurement(
@@ -64,7 +80,7 @@ def prepare_measurement(
         time=shown["time"].values,
         displacement=displacement,
         sigma=shown["sigma"].values.astype(float),
-        use=_use(displacement, design),
+        use=_lose(displacement, _roles(design)),
         centre=centre,
         registration=found,
         track=turned,
@@ -106,10 +122,31 @@ def _another(why: str) -> UserError:
     )
 
 
-def select_frames(track: xr.Dataset) -> Ints:
-    """Selects frames to compare: no duplicates, and every so many of a long track."""
-    frames = distinct_frames(track)
-    return frames[:: -(-len(frames) // MOST_FRAMES)]
+def select_frames(time: Floats, period: float) -> Ints:
+    """Selects frames to compare, by number: all of them, or of many those within the response.
+
+    These are thinned to at most `MOST_FRAMES`.
+
+    Args:
+        time: (frames,) of the response, s; NaN beyond its ends.
+        period: of the drive, s; NaN without.
+
+    Raises:
+        UserError: too few of them would be left in a period.
+    """
+    if len(time) <= MOST_FRAMES:
+        return np.arange(len(time))
+    within = np.flatnonzero(time >= 0.0)
+    every = -(-len(within) // MOST_FRAMES)
+    kept = within[::every]
+    if every > 1 and (left := period / float(np.median(np.diff(time[kept])))) < LEAST_PER_PERIOD:
+        raise UserError(
+            f"{len(within)} frames show the response, of which {MOST_FRAMES} are compared:"
+            f" {left:.2g} in a period of the drive, where {LEAST_PER_PERIOD} are wanted",
+            key="window",
+            remedy="give a window that ends after fewer periods, and track it again",
+        )
+    return kept
 
 
 def _centres(design: xr.Dataset) -> Floats:
@@ -119,10 +156,15 @@ def _centres(design: xr.Dataset) -> Floats:
     return out
 
 
-def _use(motion: Floats, design: xr.Dataset) -> NDArray[np.int8]:
-    lost = np.isfinite(motion).all(axis=2).mean(axis=0) < _SEEN
+def _roles(design: xr.Dataset) -> NDArray[np.int8]:
+    """Tells the use (units,) of units that are all seen."""
     support = design["support"].values
     absent = np.isnan(design["vertices"].values[:, 0, 0])
-    conditions = [absent, support == CLAMPED, support == DRIVEN, lost]
-    chosen = np.select(conditions, [ABSENT, HELD, PUSHED, LOST], COMPARED)
-    return np.asarray(chosen, dtype=np.int8)
+    conditions = [absent, support == CLAMPED, support == DRIVEN]
+    return np.asarray(np.select(conditions, [ABSENT, HELD, PUSHED], COMPARED), dtype=np.int8)
+
+
+def _lose(motion: Floats, role: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Marks as lost those that would be compared but for being seldom seen."""
+    seldom = np.isfinite(motion).all(axis=2).mean(axis=0) < _SEEN
+    return np.where((role == COMPARED) & seldom, LOST, role).astype(np.int8)

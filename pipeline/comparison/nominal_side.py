@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from pipeline.comparison import alignment
 from pipeline.comparison.alignment import Lag, SampledMotion
 from pipeline.runtime import UserError
-from sim.core import Floats
+from sim.core import Floats, Ints
 
 
 class ComparisonAxis(NamedTuple):
@@ -20,6 +20,10 @@ class ComparisonAxis(NamedTuple):
     branch: NDArray[np.int8]  # (frames,) which way the load goes
     lag: Lag | None  # of the drive; None for load, which has no time
     turn: float  # direction of the measured less that of the nominal drive, rad
+
+    def taken(self, kept: Ints) -> "ComparisonAxis":
+        """Selects frames (n,) by number."""
+        return self._replace(time=self.time[kept], branch=self.branch[kept])
 
 
 class NominalSide(NamedTuple):

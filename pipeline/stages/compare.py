@@ -18,6 +18,7 @@ from pipeline.comparison import (
     list_quantities,
     pixel_size,
     prepare_measurement,
+    select_frames,
     simulate_specimen,
 )
 from pipeline.datasets import provenance
@@ -72,11 +73,13 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     structure = structures_of(scene_of(asked, args.problem.parent), design)[recording.structure]
     scene = structure.scene
     leading = scene.lattice.id[scene.loads.cases[0].leading]
-    measured = prepare_measurement(datasets.read(args.track, "track"), built, leading)
-    shown = find_axis(measured.time, measured.drive, response, static=asked.static)
+    every = prepare_measurement(datasets.read(args.track, "track"), built, leading)
+    axis = find_axis(every.time, every.drive, response, static=asked.static)
+    frequency = np.nan if asked.frequency is None else asked.frequency
+    kept = select_frames(axis.time, 1 / frequency)
+    measured, shown = every.taken(kept), axis.taken(kept)
     way = drive_direction(response)
     inside = measured.compared & (built["roi"].values == 1)
-    every = whole.isel(case=recording.case)
     return Compared(
         measurement=measured,
         axis=shown,
@@ -84,9 +87,9 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
             asked, structure, measured.track, measured.time, way, args.threads
         ),
         nominal=interpolate_response(response, shown.time),
-        quantities=list_quantities(asked, every, shown.time, inside),
+        quantities=list_quantities(asked, whole.isel(case=recording.case), shown.time, inside),
         design=built,
-        frequency=np.nan if asked.frequency is None else asked.frequency,
+        frequency=frequency,
         level=asked.prediction.level,
         pixel=(
             pixel_size(measured.track, np.nanmean(measured.centre, axis=0)),
