@@ -152,7 +152,7 @@ def _pair(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[
 
 
 def _correlation(measured: SampledMotion, nominal: SampledMotion, lag: float) -> float:
-    """Correlates the courses; those frames alone are gone through in which the nominal one moves."""
+    """Correlates the courses, going through those frames alone in which the nominal one moves."""
     ends = nominal.time[[0, -1]]
     first, n = np.searchsorted(measured.time, lag + ends, side="right")
     if n == 0:

@@ -1,7 +1,7 @@
 """Registers the measured places of the units at rest: a rigid motion and a scale.
 
-The rigid part is taken out of what is compared. The scale is told and left in: a specimen that was
-made too large, or a pixel of the wrong size, is a finding.
+The rigid part is taken out of what is compared, the scale left in. By the camera of a track it is 1
+whatever was printed, as that camera is fitted to the same units where the design has them.
 """
 
 from typing import NamedTuple

@@ -62,8 +62,9 @@ def _alignment(recording: RecordedMotion) -> Iterator[Fact]:
     gain = float(data["drive_gain"])
     if np.isfinite(gain):
         yield told("{name}_gain", gain)
-    scale, sigma = float(data["registration_scale"]), float(data["registration_scale_sigma"])
-    yield told("{name}_scale", scale, sigma=sigma)
+    pixel, stated = float(data["pixel_size"]), float(data["pixel_size_stated"])
+    if np.isfinite(pixel / stated):
+        yield told("{name}_pixel", pixel / stated, pixel=pixel, stated=stated)
     if samples := int(data["band_samples"]):
         usual = 100 * float(np.nanmean(data["band_coverage_usual"].values))
         covered = float(np.nanmean(data["band_coverage"].values))

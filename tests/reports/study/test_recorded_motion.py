@@ -166,6 +166,22 @@ def test_comparisons_are_read_from_their_folders(tmp_path: Path) -> None:
         load(problem, None, files, [file])
 
 
+def test_pixels_are_told_over_those_stated_if_any(filmed: dict[str, StudyResults]) -> None:
+    study = filmed["study"]
+
+    def told(stated: float) -> dict[str, Fact]:
+        sizes = {"pixel_size": 0.49, "pixel_size_stated": stated}
+        compared = {name: data.assign(sizes) for name, data in study.compared.items()}
+        made = kinds.kind_of(study.problem).facts(replace(study, compared=compared))
+        return {fact.key: fact for fact in made}
+
+    found = told(0.5)
+    assert found["altered_1_pixel"].value == pytest.approx(0.98)
+    assert "0.49 mm" in found["altered_1_pixel"].note
+    assert "altered_1_scale" not in found
+    assert "altered_1_pixel" not in told(np.nan)
+
+
 def test_prediction_bands_are_told_of_with_their_own_level(
     filmed: dict[str, StudyResults],
 ) -> None:
