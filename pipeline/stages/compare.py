@@ -31,6 +31,8 @@ from pipeline.tracking.geometry import as_built
 from pipeline.virtual_lab import select_structure
 
 LOG = logging.getLogger(__name__)
+_OPPOSED = -0.5
+"""Correlation of forces below which a load cell is thought to count the other way."""
 
 
 def work(args: argparse.Namespace) -> None:
@@ -144,3 +146,10 @@ def _tell(told: xr.Dataset) -> None:
         json.dumps([round(100 * float(each), 1) for each in apart]),
         json.dumps([round(float(each), 4) for each in alike]),
     )
+    along = float(xr.corr(told["load_force"], told["simulated_force"]))
+    if along < _OPPOSED:
+        LOG.warning(
+            "the load cell's force falls where the simulated one rises (correlation %.2f); if it"
+            " counts against the drive, write load_cell: {reversed: true} in the recording",
+            along,
+        )

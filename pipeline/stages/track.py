@@ -206,7 +206,9 @@ def _track(path: Path, args: argparse.Namespace) -> None:
         log = _logged(asked, asked.load_cell, held, video)
     table = sidecar_path(args.out, path, *parents.values(), suffix=".csv")
     track = followed(asked, design, video, path)
-    force = None if log is None else load_cell.forces(log, track.start + track.time)
+    force = None
+    if log is not None and asked.load_cell is not None:
+        force = load_cell.forces(log, track.start + track.time, asked.load_cell.zero)
     if force is not None and not np.isfinite(force).any():
         LOG.warning("the load cell's log holds no force at the times of the frames")
     made = assemble_track(design, track, force)

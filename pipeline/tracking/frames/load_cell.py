@@ -1,7 +1,7 @@
 """Samples forces that were logged beside a video at the times of its frames."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ def read(path: Path, cell: LoadCellLog) -> ForceLog:
 
     Args:
         path: the file.
-        cell: its columns, and the time of the video's first frame on its clock.
+        cell: its columns, their sign, and the time of the video's first frame on its clock.
 
     Raises:
         UserError: it cannot be read, or runs backwards.
@@ -36,10 +36,10 @@ def read(path: Path, cell: LoadCellLog) -> ForceLog:
     if (np.diff(clock) <= 0).any():
         remedy = "sort it by time, each time once"
         raise UserError("the log's time does not ascend", file=path, key=cell.time, remedy=remedy)
-    return ForceLog(clock - cell.offset, force)
+    return ForceLog(clock - cell.offset, -force if cell.reversed else force)
 
 
-def forces(log: ForceLog, time: Floats) -> Floats:
+def forces(log: ForceLog, time: Floats, zero: Literal["file", "start"] = "file") -> Floats:
     """Returns the force (frames,) in N, linear between the log's lines, NaN beyond them.
 
     Where the log is finer than the video, it is averaged over the frame's interval first, so that
@@ -48,18 +48,29 @@ def forces(log: ForceLog, time: Floats) -> Floats:
     Args:
         log: of the load cell.
         time: (frames,) since the file's first frame, s.
+        zero: as the file counts, or where the frames start.
     """
     inside = (time >= log.clock[0]) & (time <= log.clock[-1])
-    return np.where(inside, _smooth(log.clock, log.force, time), np.nan)
+    force = np.where(inside, _smooth(log.clock, log.force, time), np.nan)
+    return force - force[0] if zero == "start" else force
 
 
 def check(log: ForceLog, window: tuple[float, float], path: Path, cell: LoadCellLog) -> None:
-    """Refuses a log that holds nothing of a window of the video's time, s.
+    """Refuses a log that holds nothing of a window of the video's time, s, or not its zero.
 
     Raises:
         UserError: telling both spans of time.
     """
     start, end = window
+    if cell.zero == "start" and log.clock[0] > start:
+        raise UserError(
+            f"the log starts at {log.clock[0]:.6g} s of the video's time, after the first frame"
+            f" ({start:.6g} s), whose force is to be zero",
+            file=path,
+            key="load_cell.zero",
+            value=cell.zero,
+            remedy="let the window start later, where the specimen rests, or leave this key out",
+        )
     if log.clock[-1] < start or log.clock[0] > end:
         raise UserError(
             f"the log (from {log.clock[0]:.6g} s to {log.clock[-1]:.6g} s of the video's time) and"

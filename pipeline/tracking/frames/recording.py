@@ -44,17 +44,23 @@ class Window(Section):
 class LoadCellLog(Section):
     """Forces that were logged beside the video, with a clock of their own.
 
+    Those with which the drive pushes or pulls along its own direction are to be positive.
+
     Attributes:
         file: a CSV with a heading, as seen from the recording's own file.
         time: name of the column of times, in the unit of its heading, or s.
         force: name of the column of forces, likewise, or N.
         offset: time of the video's first frame on the log's clock, s.
+        reversed: whether the cell counts the other way, such as compression negative.
+        zero: of forces: as they are, or where the tracked part of the video starts.
     """
 
     file: str = Field(min_length=1)
     time: str = "time"
     force: str = "force"
     offset: Finite = 0.0
+    reversed: bool = False
+    zero: Literal["file", "start"] = "file"
 
 
 class Recording(Section):

@@ -96,6 +96,17 @@ def test_forces_are_those_of_the_load_cell(whole: xr.Dataset) -> None:
     assert inside.all()
 
 
+def test_a_load_cell_that_counts_against_the_drive_is_told_of(
+    study: list[str], film: xr.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [word for word in study if word != "--quiet"]
+    for sign in (1, -1):
+        made = film.assign(load_force=sign * film["load_force"])
+        assert run_stage("compare", words(given, written(made, tmp_path), tmp_path)) == 0
+        told = capsys.readouterr().err
+        assert ("write load_cell: {reversed: true}" in told) == (sign < 0)
+
+
 def test_a_response_of_another_design_is_refused(
     study: list[str], film: xr.Dataset, tmp_path: Path, failing: Failing
 ) -> None:

@@ -33,6 +33,18 @@ def test_a_fine_log_is_averaged_over_each_frame(tmp_path: Path) -> None:
     np.testing.assert_allclose(found[1:4], 3.0 + TIME[1:4], atol=0.02)
 
 
+def test_a_cell_counts_along_the_drive_and_from_the_start_if_asked(tmp_path: Path) -> None:
+    path = log(tmp_path, "time,force\n0.0,-8.0\n0.4,-12.0\n")
+    cell = LoadCellLog(file="load.csv", reversed=True, zero="start")
+    read = load_cell.read(path, cell)
+    load_cell.check(read, (0.0, 0.4), path, cell)
+    np.testing.assert_allclose(load_cell.forces(read, TIME), 8.0 + 10 * TIME)
+    np.testing.assert_allclose(load_cell.forces(read, TIME, cell.zero), 10 * TIME, atol=1e-12)
+    late = log(tmp_path, "time,force\n0.2,-8.0\n0.4,-12.0\n")
+    with refused("after the first frame", "load_cell.zero"):
+        load_cell.check(load_cell.read(late, cell), (0.0, 0.4), late, cell)
+
+
 @cases("tracking", "text, offset, told")
 def test_a_faulty_log_is_refused(tmp_path: Path, text: str, offset: float, told: str) -> None:
     path, cell = log(tmp_path, text), LoadCellLog(file="load.csv", offset=offset)
