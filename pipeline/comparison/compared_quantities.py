@@ -22,6 +22,7 @@ class Quantity(NamedTuple):
     units: Ints  # (n,) places of the units that count
     less: Floats | None = None  # (frames, n_units, 3) motion that is taken off theirs first
     sampled: bool = True  # whether units stand for others: an interval holds their scatter
+    signed: bool = False  # whether it may be below zero; noise makes others larger
 
     def along(self, motion: Floats, units: Ints) -> Floats:
         """Computes the number (..., frames) of motions (..., frames, n, 3) of units (n,)."""
@@ -45,7 +46,7 @@ def list_quantities(
     found = {
         "mean_rotation": Quantity(mean_rotation, units),
         "mean_displacement": Quantity(mean_displacement, units),
-        "contraction": Quantity(nearer, rows, sampled=False),
+        "contraction": Quantity(nearer, rows, sampled=False, signed=True),
     }
     if "intact" in response["structure"].values:
         intact = response.sel(structure="intact")

@@ -159,9 +159,10 @@ def _forces(made: Compared, random: np.random.Generator) -> Variables:
 
 def _curves(made: Compared, random: np.random.Generator) -> Variables:
     sides, along = made.sides, ("source", "time", "estimate")
+    smooth = curves.smooth_motion(sides)
     nothing = np.full((3, len(sides.measured), 3), np.nan)
     followed = {
-        name: curves.quantity_curve(sides, made.quantities[name], random)
+        name: curves.quantity_curve(sides, smooth, made.quantities[name], random)
         if name in made.quantities
         else nothing
         for name in FOLLOWED
@@ -170,7 +171,7 @@ def _curves(made: Compared, random: np.random.Generator) -> Variables:
         **{name: (along, values) for name, values in followed.items()},
         "peak_to_peak": (
             ("source", "unit", "dof", "estimate"),
-            curves.estimate_peaks(sides, random),
+            curves.estimate_peaks(sides, smooth, random),
         ),
     }
 

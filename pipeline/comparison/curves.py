@@ -39,18 +39,27 @@ class Sides(NamedTuple):
         return bands.band_limits(copies, self.level)
 
 
-def quantity_curve(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
-    """Computes a quantity along the frames (3 sides, frames, 3 estimates)."""
+def quantity_curve(
+    sides: Sides, smooth: Floats, quantity: Quantity, random: np.random.Generator
+) -> Floats:
+    """Computes a quantity along the frames (3 sides, frames, 3 estimates).
+
+    Noise makes magnitudes larger. What it adds to them in the mean is taken out of the measured
+    interval, as a root sum of squares: in the track, by that of the motion `smooth` (of
+    `smooth_motion`), and in the copies, by their mean.
+    """
     of, units = quantity.along, quantity.units
     out = np.full((3, len(sides.measured), 3), np.nan)
     for place, motion in enumerate(sides.motions):
         out[place, :, 0] = of(motion[:, units], units)
-    out[0, :, 1:] = _measured_limits(sides, quantity, random).T
+    out[0, :, 1:] = _measured_limits(sides, smooth, quantity, random).T
     out[1, :, 1:] = sides.within(of(sides.copies[:, :, units], units))[::2].T
     return out
 
 
-def _measured_limits(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
+def _measured_limits(
+    sides: Sides, smooth: Floats, quantity: Quantity, random: np.random.Generator
+) -> Floats:
     """Computes an interval (2, frames) by a bootstrap over units, with the noise."""
     units, count = quantity.units, len(quantity.units)
     copies = np.empty((COPIES, len(sides.measured)))
@@ -59,7 +68,16 @@ def _measured_limits(sides: Sides, quantity: Quantity, random: np.random.Generat
         drawn = units[random.integers(count, size=count)] if sampled else units
         noise = random.standard_normal((len(copy), count, 3)) * sides.sigma[:, drawn]
         copy[:] = quantity.along(sides.measured[:, drawn] + noise, drawn)
-    return interval_ends(copies)
+    ends = interval_ends(copies)
+    if quantity.signed:
+        return ends
+    mean = np.zeros(len(smooth))
+    for _ in range(_TRIALS):
+        noise = random.standard_normal((len(mean), count, 3)) * sides.sigma[:, units]
+        mean += quantity.along(smooth[:, units] + noise, units) / _TRIALS
+    added = np.nan_to_num(mean**2 - quantity.along(smooth[:, units], units) ** 2)
+    again = copies.mean(axis=0) ** 2 - quantity.along(sides.measured[:, units], units) ** 2
+    return np.sqrt(np.maximum(ends**2 - again - added, 0.0))
 
 
 def peak_to_peak(motion: Floats) -> Floats:
@@ -84,11 +102,12 @@ def _highest(motion: Floats) -> Floats:
     return np.asarray(np.where(inner, top + rise, top).squeeze(axis=-3))
 
 
-def estimate_peaks(sides: Sides, random: np.random.Generator) -> Floats:
+def estimate_peaks(sides: Sides, smooth: Floats, random: np.random.Generator) -> Floats:
     """Computes peak to peak (3 sides, units, 3 dofs, 3 estimates) of all units.
 
     Noise makes extremes larger, at whichever frames they are. The measured interval is that of the
-    noise at the two extreme frames, about the value less what noise adds to it.
+    noise at the two extreme frames, about the value less what noise adds to the motion `smooth`,
+    that of `smooth_motion`.
     """
     out = np.full((3, *sides.measured.shape[1:], 3), np.nan)
     for place, motion in enumerate(sides.motions):
@@ -96,15 +115,14 @@ def estimate_peaks(sides: Sides, random: np.random.Generator) -> Floats:
     known = np.isfinite(sides.measured)
     ends = [np.where(known, way * sides.measured, -np.inf).argmax(axis=0) for way in (-1, 1)]
     sigma = np.hypot(*(np.take_along_axis(sides.sigma, end[None], axis=0)[0] for end in ends))
-    middle = out[0, ..., 0] - _added_by_noise(sides, random)
+    middle = out[0, ..., 0] - _added_by_noise(sides, smooth, random)
     out[0, ..., 1], out[0, ..., 2] = (middle + sign * _SPREAD * sigma for sign in (-1, 1))
     out[1, ..., 1:] = np.moveaxis(sides.within(peak_to_peak(sides.copies))[::2], 0, -1)
     return out
 
 
-def _added_by_noise(sides: Sides, random: np.random.Generator) -> Floats:
+def _added_by_noise(sides: Sides, smooth: Floats, random: np.random.Generator) -> Floats:
     """Estimates how much (units, dofs) noise adds to peak to peak: that of the smoothed motion."""
-    smooth = _smooth(sides)
     still, added = peak_to_peak(smooth), np.zeros(smooth.shape[1:])
     for _ in range(_TRIALS):
         noise = random.standard_normal(smooth.shape) * sides.sigma
@@ -112,7 +130,7 @@ def _added_by_noise(sides: Sides, random: np.random.Generator) -> Floats:
     return added
 
 
-def _smooth(sides: Sides) -> Floats:
+def smooth_motion(sides: Sides) -> Floats:
     """Smooths the measured motion; NaN for units that are seldom seen."""
     out = np.full_like(sides.measured, np.nan)
     frames = np.arange(len(out), dtype=np.float64)

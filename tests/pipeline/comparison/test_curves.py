@@ -7,6 +7,7 @@ from pipeline.comparison import curves
 from pipeline.comparison.compared_quantities import (
     Quantity,
     mean_approach,
+    mean_displacement,
     mean_rotation,
     normalised_rms,
 )
@@ -25,6 +26,17 @@ def sides(measured: np.ndarray, noise: float = NOISE, gain: float = 1.0) -> curv
     return curves.Sides(seen, sigma, gain * WAVES, gain * WAVES, copies, 0.95)
 
 
+def curve(seen: curves.Sides, quantity: Quantity) -> np.ndarray:
+    """The quantity's curve, with the first draws."""
+    smooth = curves.smooth_motion(seen)
+    return curves.quantity_curve(seen, smooth, quantity, np.random.default_rng(0))
+
+
+def peaks(seen: curves.Sides) -> np.ndarray:
+    """The peaks, with the first draws."""
+    return curves.estimate_peaks(seen, curves.smooth_motion(seen), np.random.default_rng(0))
+
+
 def test_peaks_between_frames_are_not_missed_of_units_often_seen() -> None:
     off = np.linspace(-0.5, 0.5, 33).reshape(11, 3)
     hill = 1 - 0.05 * (np.arange(-4, 5)[:, None, None] - off) ** 2
@@ -39,7 +51,7 @@ def test_peaks_between_frames_are_not_missed_of_units_often_seen() -> None:
 
 
 def test_intervals_of_peaks_hold_the_truth_though_noise_makes_them_larger() -> None:
-    found = curves.estimate_peaks(sides(WAVES), np.random.default_rng(0))
+    found = peaks(sides(WAVES))
     value, low, high = np.moveaxis(found[0], -1, 0)
     assert value.mean() > 2.0 + 0.5 * NOISE
     assert ((low <= 2.0) & (high >= 2.0)).mean() > 0.9
@@ -55,7 +67,7 @@ def test_intervals_of_peaks_are_of_frames_that_were_seen(offset: float) -> None:
     missed = whole._replace(measured=whole.measured.copy(), sigma=whole.sigma.copy())
     missed.measured[10], missed.sigma[10] = np.nan, np.nan
     for seen in (whole, missed):
-        low, high = np.moveaxis(curves.estimate_peaks(seen, np.random.default_rng(0))[0], -1, 0)[1:]
+        low, high = np.moveaxis(peaks(seen)[0], -1, 0)[1:]
         np.testing.assert_allclose((high - low)[middle], 2 * 1.96 * NOISE * np.sqrt(2), rtol=1e-4)
 
 
@@ -63,9 +75,7 @@ def test_a_departure_is_that_from_the_other_motion() -> None:
     intact = WAVES
     of = partial(normalised_rms, spacing=15.0, unit=normalised_rms(intact, 15.0).max())
     known = Quantity(of, np.arange(0, UNITS, 2), intact)
-    found = curves.quantity_curve(
-        sides(1.1 * WAVES, noise=1e-4, gain=1.2), known, np.random.default_rng(0)
-    )
+    found = curve(sides(1.1 * WAVES, noise=1e-4, gain=1.2), known)
     exact = 0.1 * normalised_rms(intact[:, ::2], 15.0) / normalised_rms(intact, 15.0).max()
     np.testing.assert_allclose(found[0, :, 0], exact, atol=1e-3)
     np.testing.assert_allclose(found[1, :, 0], 2 * exact, atol=1e-9)
@@ -74,18 +84,28 @@ def test_a_departure_is_that_from_the_other_motion() -> None:
     assert (found[1, :, 1] < exact).all()
 
 
+@pytest.mark.parametrize("size", [0.0, 0.01, 0.1, 1.0])
+def test_intervals_of_magnitudes_near_the_noise_hold_the_truth(size: float) -> None:
+    """Noise makes magnitudes larger, which their intervals leave out."""
+    for quantity in (mean_rotation, mean_displacement):
+        every = Quantity(quantity, np.arange(UNITS), sampled=False)
+        found = curve(sides(size * WAVES), every)
+        truth = quantity(size * WAVES)
+        _, low, high = found[0].T
+        assert ((low <= truth) & (truth <= high)).mean() > 0.9
+        assert (high - low).mean() < 1.5 * NOISE
+
+
 def test_units_that_stand_for_no_others_are_not_drawn() -> None:
     """Then the interval is that of the noise alone: here of the means of two rows."""
     rows = np.arange(10)
-    apart = Quantity(partial(mean_approach, lower=5), rows, sampled=False)
-    found = curves.quantity_curve(sides(WAVES), apart, np.random.default_rng(0))
+    apart = Quantity(partial(mean_approach, lower=5), rows, sampled=False, signed=True)
+    found = curve(sides(WAVES), apart)
     exact = WAVES[:, :5, 1].mean(axis=1) - WAVES[:, 5:10, 1].mean(axis=1)
     np.testing.assert_allclose(found[1, :, 0], exact, atol=1e-12)
     wide = (found[0, :, 2] - found[0, :, 1]).mean()
     np.testing.assert_allclose(wide, 2 * 1.96 * NOISE * np.sqrt(2 / 5), rtol=0.1)
-    drawn = curves.quantity_curve(
-        sides(WAVES), Quantity(mean_rotation, rows), np.random.default_rng(0)
-    )
+    drawn = curve(sides(WAVES), Quantity(mean_rotation, rows))
     assert (drawn[0, :, 2] - drawn[0, :, 1]).mean() > 0.1
 
 

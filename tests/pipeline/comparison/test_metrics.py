@@ -123,3 +123,8 @@ def test_the_interval_of_a_reduction_is_that_of_drawn_quantities() -> None:
     assert value == 1 - 1.9 / 5.2
     one_sided = compute_reduction(np.array([2.0, 2.0, 2.0]), np.array([1.0, 1.0, 1.2]))
     np.testing.assert_array_equal(one_sided, [0.5, 0.4, 0.5])
+
+
+def test_a_value_that_noise_put_beyond_its_interval_has_no_end_on_that_side() -> None:
+    found = compute_reduction(np.array([2.0, 1.9, 2.1]), np.array([0.1, 0.02, 0.06]))
+    np.testing.assert_allclose(found, [0.95, 0.9475, 0.95 + np.hypot(0.04, 0.0025)])
