@@ -196,10 +196,8 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     asked = recordings.load_recording(path)
     video, source = _sources(asked, path, args.design)
     design = as_built(datasets.read(source, "design"), asked.structure)
-    if asked.load_axis == "driven displacement" and not driven_units(design).any():
-        remedy = "write `load_axis: time`, or give the design of a study with driven units"
-        what = "the design has no driven units"
-        raise UserError(what, file=path, key="load_axis", value=asked.load_axis, remedy=remedy)
+    if asked.load_axis == "driven displacement":
+        _check_driven(design, path)
     parents, log = {"design": source, "video": video}, None
     if asked.load_cell is not None:
         held = parents["load_cell"] = path.parent / asked.load_cell.file
@@ -227,6 +225,20 @@ def _track(path: Path, args: argparse.Namespace) -> None:
         words = ["--track", str(args.out), "--video", str(video), "--out-dir"]
         command = shlex.join([*words, str(args.out.with_name(f"{args.out.stem}_report"))])
         LOG.info("overlay and quality page: python -m %sreports tracking %s", PREFIX, command)
+
+
+def _check_driven(design: xr.Dataset, source: Path) -> None:
+    """Refuses the displacement of the driven units as an axis where it is not that of one drive."""
+    drives = json.loads(design.attrs["problem"]).get("drive", {}).get("drives", [])
+    if not driven_units(design).any():
+        remedy = "write `load_axis: time`, or give the design of a study with driven units"
+        what = "the design has no driven units"
+    elif len(drives) > 1:
+        remedy = "write `load_axis: time`"
+        what = f"{len(drives)} drives act at once: the mean over all their units is that of none"
+    else:
+        return
+    raise UserError(what, file=source, key="load_axis", value="driven displacement", remedy=remedy)
 
 
 def _logged(asked: Recording, cell: LoadCellLog, held: Path, video: Path) -> load_cell.ForceLog:

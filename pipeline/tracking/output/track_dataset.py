@@ -56,7 +56,10 @@ def pose_variables(
 
 
 def label_track(design: xr.Dataset, time: Floats, variables: Mapping[str, object]) -> xr.Dataset:
-    """Variables of a track with the labels of the design's units, and how far these are driven."""
+    """Labels variables of a track by the design's units, and tells how far these are driven.
+
+    That is the mean over all driven units, whichever of several drives moves them.
+    """
     coordinates = {
         **{name: design[name] for name in ("unit", "i", "j", "xy")},
         "time": (("time",), time),

@@ -1,4 +1,5 @@
 import errno
+import json
 from pathlib import Path
 
 import av
@@ -108,6 +109,20 @@ def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
     mean = made["displacement"].isel(unit=[112, 113], dof=[0, 1]).mean("unit")
     np.testing.assert_allclose(made["drive_displacement"], mean.values, atol=1e-9)
     assert "drive_displacement" in made.coords
+
+
+def test_drives_at_once_have_no_common_displacement(recording: Path, failing: Failing) -> None:
+    path = recording.with_name("f_silhouette_design.nc")
+    design = datasets.read(path, "design")
+    driven = design["support"].copy()
+    driven[[112, 113]] = 2
+    drives = json.dumps({"drive": {"kind": "several", "drives": [{}, {}]}})
+    origin = {"problem": drives, "problem_hash": "", "parents": "{}"}
+    datasets.write(design.assign(support=driven), path, "design", origin)
+    extended(recording, "load_axis: driven displacement")
+    words = refused(recording, failing)
+    assert "2 drives act at once" in words
+    assert "load_axis: time" in words
 
 
 @cases("tracking", "old, new, told")
