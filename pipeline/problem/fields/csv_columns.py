@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 _LARGEST = 512 << 20
 _UNIT = re.compile(r"[\[(][^\])]+[\])]")
 _NUMBERS = re.compile(r"[\s\";]*[-+.]?\d")
+_GAP = re.compile(r"(?:[-+]?nan(?:\(.*\))?|#?n/?a)?", re.IGNORECASE)
+"""Cells of what was not measured, as programs write them."""
 _HEADING = re.compile(
     r"(?P<name>.*?)\s*(?:(?P<bracket>[\[(])|(?<=\s)/\s+)(?P<unit>[^\])]+)(?(bracket)[\])])"
 )
@@ -35,12 +37,16 @@ class CsvCells(NamedTuple):
 
     def number(self, row: list[str], column: int) -> float | None:
         """Reads the number in a cell; None where it holds no finite one."""
-        text = row[column] if column < len(row) else ""
+        text = self.text(row, column)
         try:
             value = float(text if self.separator == "," else text.replace(",", "."))
         except ValueError:
             return None
         return value if math.isfinite(value) else None
+
+    def text(self, row: list[str], column: int) -> str:
+        """Returns what stands in a cell; nothing beyond the row's end."""
+        return row[column] if column < len(row) else ""
 
 
 def read_cells(path: Path) -> CsvCells:
@@ -74,14 +80,15 @@ def _separator(lines: list[str]) -> str:
 def read_columns(
     path: Path, names: Sequence[str], dimensions: Sequence[units.Dimension] = ()
 ) -> Floats:
-    """Reads the named columns (lines, names); lines with gaps are left out.
+    """Reads the named columns (lines, names); lines with gaps, empty or NaN, are left out.
 
-    Lines above the heading are comments. Where the dimensions of columns are given, and the heading
-    (as `NAME (UNIT)`, `NAME / UNIT` or `NAME_UNIT`) or the line below it has units, numbers are
-    converted to working units; else they are in these.
+    Lines above the heading are comments, as are those of words alone below it. Where the dimensions
+    of columns are given, and the heading (as `NAME (UNIT)`, `NAME / UNIT` or `NAME_UNIT`) or the
+    line below it has units, numbers are converted to working units; else they are in these.
 
     Raises:
-        UserError: no such file, no such column, a unit of another dimension, or no numbers in them.
+        UserError: no such file, no such column, a unit of another dimension, no numbers in them, or
+            a cell that holds something else.
     """
     import numpy as np
 
@@ -96,8 +103,16 @@ def read_columns(
         ]
         if (unit := _told_unit(column, dimension)) is not None:
             factors[place] = _factor(unit, dimension, name, path)
-    found = [[cells.number(row, named[name]) for name in names] for row in cells.rows[heading:]]
-    kept = np.array([values for values in found if None not in values], float)
+    columns = [(name, named[name]) for name in names]
+    found: list[list[float | None]] = []
+    for line, row in enumerate(cells.rows[heading:], heading + 1):
+        values = [cells.number(row, at) for _, at in columns]
+        if None not in values:
+            found.append(values)
+        elif (unread := _unread(cells, row, columns)) is not None:
+            remedy = "write plain numbers, without marks of thousands; empty what was not measured"
+            raise _not_finite(path, line, *unread, remedy)
+    kept = np.array(found, float)
     if not len(kept):
         remedy = "give plain numbers below the heading"
         raise UserError("no line holds numbers in all columns", file=path, remedy=remedy)
@@ -133,16 +148,30 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
     for place, (number, row) in enumerate(lines):
         for column, (name, at) in enumerate((name, named[name]) for name in wanted):
             if (value := cells.number(row, at)) is None:
-                raise UserError(
-                    "not a finite number",
-                    file=path,
-                    line=number,
-                    key=name,
-                    value=row[at] if at < len(row) else "",
-                    remedy="mend or delete the line: all wanted columns need finite numbers",
-                )
+                remedy = "mend or delete the line: all wanted columns need finite numbers"
+                raise _not_finite(path, number, name, cells.text(row, at), remedy)
             found[place, column] = value
     return np.asarray(found * factors)
+
+
+def _unread(
+    cells: CsvCells, row: list[str], columns: list[tuple[str, int]]
+) -> tuple[str, str] | None:
+    """Finds a column whose cell holds neither number nor gap, and that cell; none among words."""
+    texts = [(name, at, cells.text(row, at)) for name, at in columns]
+    if not any(_NUMBERS.match(text) for *_, text in texts):
+        return None
+    unread = (
+        (name, text)
+        for name, at, text in texts
+        if cells.number(row, at) is None and not _GAP.fullmatch(text)
+    )
+    return next(unread, None)
+
+
+def _not_finite(path: Path, line: int, name: str, value: str, remedy: str) -> UserError:
+    what = "not a finite number"
+    return UserError(what, file=path, line=line, key=name, value=value, remedy=remedy)
 
 
 def _with_units_below(rows: list[list[str]]) -> list[list[str]]:

@@ -97,3 +97,19 @@ def test_a_name_before_a_stroke_names_the_column(tmp_path: Path) -> None:
     path = log(tmp_path, "Time / ms;Load / kN\n100;0,02\n200;0,04\n")
     found = load_cell.read(path, LoadCellLog(file="load.csv", time="Time", force="Load"))
     np.testing.assert_allclose(found.force, [20.0, 40.0])
+
+
+@pytest.mark.parametrize("cell", ["1.004,2", "1 004,2", "OVL", ">1000", "inf", "12,0 N"])
+def test_a_force_that_is_no_number_is_refused(tmp_path: Path, cell: str) -> None:
+    """Left out, it would be a straight line across the peak of the test."""
+    path = log(tmp_path, f"t;F\n0,0;990,5\n0,1;{cell}\n0,2;995,0\n")
+    with refused("not a finite number", "F", "marks of thousands", path) as caught:
+        load_cell.read(path, LoadCellLog(file="load.csv", time="t", force="F"))
+    assert (caught.value.line, caught.value.value) == (3, cell)
+
+
+@pytest.mark.parametrize("gap", ["", "NaN", "-nan(ind)", "#N/A", "n/a"])
+def test_what_was_not_measured_is_a_gap(tmp_path: Path, gap: str) -> None:
+    text = f"t;F\nClock;Cell\n0,0;1,5\n0,1;{gap}\n0,2\n\n0,3;2,5\nEnd of test;\n"
+    cell = LoadCellLog(file="load.csv", time="t", force="F")
+    np.testing.assert_array_equal(load_cell.read(log(tmp_path, text), cell).force, [1.5, 2.5])
