@@ -66,8 +66,9 @@ def _brightness(frame: av.VideoFrame) -> Picture:
     if frame.format.name not in _READY:
         return np.asarray(frame.to_ndarray(format="gray"), np.uint8)
     plane = frame.planes[0]
-    rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
-    return np.ascontiguousarray(rows[:, : plane.width])
+    rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, abs(plane.line_size))
+    upward = plane.line_size < 0  # in files that hold the last row first
+    return np.ascontiguousarray(rows[:: -1 if upward else 1, : plane.width])
 
 
 class Orientation(NamedTuple):

@@ -12,6 +12,9 @@ from sim.core import Floats
 _ROUNDED = 0.5
 """Part of an interval by which steady frames may differ: some containers count milliseconds."""
 
+_BARE = {"h264", "hevc", "m4v", "mjpeg"}
+"""Kinds of files without stamps, to which FFmpeg may give those of 25 Hz."""
+
 _BEGINNING = 8
 """Frames whose stamps show whether they are too coarse for the rate."""
 _ALL = 0.95
@@ -29,6 +32,7 @@ class FrameClock:
 
     def __init__(self, path: Path, stream: av.VideoStream, rate: float | None) -> None:
         self._path, self._usual, self._rate = path, float(stream.average_rate or 1), rate
+        self._bare = stream.container.format.name in _BARE
         self._first: float | None = None
         self._instants: set[float] = set()
         self.lasted = 0.0  # by the stamps
@@ -39,7 +43,7 @@ class FrameClock:
         Raises:
             UserError: no rate is given, and there are no stamps, or too coarse ones.
         """
-        if index == 0 and self._rate is None and frame.pts is None:
+        if index == 0 and self._rate is None and (self._bare or frame.pts is None):
             raise untimed(self._path, "the file holds no times of its frames")
         stamp = index / self._usual if frame.pts is None else float(frame.time)
         self._first = stamp if self._first is None else self._first

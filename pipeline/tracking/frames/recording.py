@@ -83,8 +83,8 @@ class Recording(Section):
         turned: how far the specimen is turned in the picture, counter-clockwise, where its lattice
             does not tell.
         mirrored: whether it is seen from behind, likewise.
-        frame_rate: of a folder of pictures or a bare stream (.h264, .hevc), which have no times
-            of their own; of a video, it replaces the times in the file, as where a high-speed
+        frame_rate: of a folder of pictures or a bare stream (.h264, .hevc, .mjpeg), which have no
+            times of their own; of a video, it replaces the times in the file, as where a high-speed
             recording plays slowly.
         exposure: of a frame, whose blur of quick motions is allowed for, but where side walls show;
             without it, that blur tells it.

@@ -17,11 +17,42 @@ from pipeline.tracking.frames.picture_folder import pictures, read_folder
 SYNTHETIC_LABEL = "SYNTHETIC"
 """Stands in the title or comment of a video that was rendered."""
 
-_ALONE = {
-    "protocol_whitelist": "file",
-    "format_whitelist": "mov,mp4,matroska,webm,avi,asf,mpeg,mpegts,mxf,ogg,flv,nut,gif,h264,hevc",
+_KINDS = {
+    ".mp4": "mov",
+    ".mkv": "matroska",
+    ".avi": "avi",
+    ".mov": "mov",
+    ".m4v": "mov,m4v",
+    ".3gp": "mov",
+    ".webm": "matroska",
+    ".wmv": "asf",
+    ".asf": "asf",
+    ".mpg": "mpeg",
+    ".mpeg": "mpeg",
+    ".ts": "mpegts",
+    ".mts": "mpegts",
+    ".m2ts": "mpegts",
+    ".mxf": "mxf",
+    ".ogv": "ogg",
+    ".flv": "flv",
+    ".nut": "nut",
+    ".gif": "gif",
+    ".cine": "cine",
+    ".y4m": "yuv4mpegpipe",
+    ".ivf": "ivf",
+    ".mjpeg": "mjpeg",
+    ".mjpg": "mjpeg",
+    ".h264": "h264",
+    ".264": "h264",
+    ".hevc": "hevc",
+    ".265": "hevc",
 }
-"""Kinds of files that hold what they show: playlists name others, and may wait for more."""
+"""FFmpeg's names of the files that hold what they show: playlists name others, and may wait."""
+
+VIDEOS = tuple(_KINDS)
+"""Ends of their names."""
+
+_ALONE = {"protocol_whitelist": "file", "format_whitelist": ",".join(_KINDS.values())}
 
 _LARGEST = 1 << 27
 """Pixels of a frame."""
@@ -111,10 +142,20 @@ def _filmed(path: Path, start: float, end: float, rate: float | None) -> Iterato
 
 
 def _opened(path: Path) -> av.container.InputContainer:
-    """Opens the file itself: neither an address that its name may be, nor others that it names."""
+    """Opens the file itself: neither an address that its name may be, nor others that it names.
+
+    Raises:
+        UserError: it is no plain file, or of a kind that is not read.
+    """
     if path.exists() and not path.is_file():
         raise UserError("not a plain file", file=path, key="video", remedy="give a video file")
-    return av.open(f"file:{path}", options=_ALONE)
+    try:
+        return av.open(f"file:{path}", options=_ALONE)
+    except av.ArgumentError as error:
+        made = f"ffmpeg -i {path.name} -c:v ffv1 {path.stem}.mkv"
+        remedy = f"convert it, e.g. {made}; copy the file again if it is broken"
+        what = "not a readable video: files of this kind are not read"
+        raise UserError(what, file=path, key="video", remedy=remedy) from error
 
 
 def _video_stream(container: av.container.InputContainer, path: Path) -> av.VideoStream:

@@ -14,6 +14,7 @@ from tests.tables import refused
 
 RATE = 30
 FLAT = np.full((64, 64), 90, np.uint8)
+PIXELS = {"mjpeg": "yuvj420p", "ffv1": "gray", "apng": "gray"}
 
 
 def written(
@@ -21,11 +22,12 @@ def written(
 ) -> Path:
     """Writes one picture at those of the instants of a rate that have these numbers."""
     ahead = {"movflags": "faststart"} if path.suffix == ".mp4" else {}
-    with av.open(str(path), "w", options=ahead) as container:
+    kind = "m4v" if codec == "mpeg4" else None  # by its name, an MP4
+    with av.open(str(path), "w", kind, options=ahead) as container:
         stream = cast("av.VideoStream", container.add_stream(codec, rate=rate))
         stream.options = options
         stream.height, stream.width = FLAT.shape
-        stream.pix_fmt = {"mjpeg": "yuvj420p", "ffv1": "gray"}.get(codec, "yuv420p")
+        stream.pix_fmt = PIXELS.get(codec, "yuv420p")
         stream.codec_context.time_base = Fraction(1, rate)
         for number in numbers:
             frame = av.VideoFrame.from_ndarray(FLAT, format="gray")
@@ -108,7 +110,15 @@ def test_the_rate_that_is_given_is_that_of_the_camera(tmp_path: Path) -> None:
     assert 0.02 < end < 0.06
 
 
-@pytest.mark.parametrize(("name", "codec"), [("a.h264", "libx264"), ("a.hevc", "libx265")])
+BARE = [
+    ("a.h264", "libx264"),
+    ("a.hevc", "libx265"),
+    ("a.mjpeg", "mjpeg"),
+    ("a.m4v", "mpeg4"),
+]
+
+
+@pytest.mark.parametrize(("name", "codec"), BARE)
 def test_a_bare_stream_has_no_times_but_by_a_rate(tmp_path: Path, name: str, codec: str) -> None:
     path = written(tmp_path / name, list(range(8)), codec)
     with refused("no times", "frame_rate", "frame_rate: '300 Hz'", path):
@@ -133,3 +143,44 @@ def test_stamps_too_coarse_for_the_rate_are_refused(tmp_path: Path) -> None:
     shown = list(read_frames(path, rate=5000.0))
     np.testing.assert_allclose([frame.time for frame in shown], np.arange(40) / 5000)
     assert len(list(read_frames(written(tmp_path / "b.mkv", list(range(40)), "ffv1", 900)))) == 40
+
+
+@pytest.mark.parametrize(("name", "codec"), [("a.y4m", "wrapped_avframe"), ("a.ivf", "libvpx")])
+def test_files_of_lossless_tools_have_times_of_their_own(
+    tmp_path: Path, name: str, codec: str
+) -> None:
+    shown = list(read_frames(written(tmp_path / name, list(range(8)), codec)))
+    np.testing.assert_allclose([frame.time for frame in shown], np.arange(8) / RATE)
+
+
+def cine(path: Path, images: list[np.ndarray], rate: int) -> Path:
+    """Writes pictures as a high-speed camera's file does, its sections one after the other."""
+    count, (rows, columns) = len(images), images[0].shape
+    header, info, setup = 44, 40, bytearray(6000)
+    struct.pack_into("<2sH", setup, 140, b"ST", len(setup))
+    struct.pack_into("<I", setup, 768, rate)
+    table, size = header + info + len(setup), rows * columns
+    first = table + 8 * count
+    places = [first + number * (8 + size) for number in range(count)]
+    path.write_bytes(
+        struct.pack("<2sHHHiIiI", b"CI", header, 0, 1, 0, count, 0, count)
+        + struct.pack("<IIIQ", header, header + info, table, 0)
+        + struct.pack("<IiiHHIIiiII", info, columns, rows, 1, 8, 0, size, 0, 0, 0, 0)
+        + setup
+        + struct.pack(f"<{count}Q", *places)
+        + b"".join(struct.pack("<II", 8, size) + image[::-1].tobytes() for image in images)
+    )
+    return path
+
+
+def test_a_cine_has_the_rate_at_which_it_was_taken(tmp_path: Path) -> None:
+    images = [FLAT + np.arange(64, dtype=np.uint8)[:, None] + number for number in range(4)]
+    shown = list(read_frames(cine(tmp_path / "a.cine", images, 5000)))
+    np.testing.assert_allclose([frame.time for frame in shown], np.arange(4) / 5000)
+    np.testing.assert_array_equal([frame.image for frame in shown], images)
+
+
+def test_a_file_of_a_kind_that_is_not_read_is_told_so(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.apng", [0, 1], "apng")
+    with refused("of this kind are not read", "video", "ffmpeg -i a.apng -c:v ffv1 a.mkv", path):
+        list(read_frames(path))
