@@ -89,7 +89,7 @@ def frame_count(path: Path) -> int:
     if path.is_dir():
         return len(pictures(path))
     try:
-        with _opened(path) as container:
+        with open_video(path) as container:
             stream = container.streams.video[0]
             return max(1, round(promised_count(container, stream, float(stream.average_rate or 0))))
     except (av.FFmpegError, FileNotFoundError, IndexError):
@@ -101,7 +101,7 @@ def video_length(path: Path, rate: float | None = None) -> float:
     if path.is_dir():
         return len(pictures(path)) / rate if rate else math.inf
     try:
-        with _opened(path) as container:
+        with open_video(path) as container:
             return stream_length(container, container.streams.video[0], rate)
     except (av.FFmpegError, FileNotFoundError, IndexError):
         return math.inf
@@ -129,7 +129,7 @@ def _even(path: Path, shown: Iterator[Frame]) -> Iterator[Frame]:
 
 def _filmed(path: Path, start: float, end: float, rate: float | None) -> Iterator[Frame]:
     try:
-        with _opened(path) as container:
+        with open_video(path) as container:
             stream = _video_stream(container, path)
             yield from _decoded(container, stream, path, (start, end), rate)
     except FileNotFoundError as error:
@@ -141,7 +141,7 @@ def _filmed(path: Path, start: float, end: float, rate: float | None) -> Iterato
         ) from error
 
 
-def _opened(path: Path) -> av.container.InputContainer:
+def open_video(path: Path) -> av.container.InputContainer:
     """Opens the file itself: neither an address that its name may be, nor others that it names.
 
     Raises:
@@ -221,7 +221,7 @@ def orientation_of(video: Path) -> Orientation:
     if not video.is_file():
         return Orientation()
     try:
-        with _opened(video) as container:
+        with open_video(video) as container:
             frame = next(iter(container.decode(container.streams.video[0])), None)
             return Orientation() if frame is None else orientation(frame)
     except (av.FFmpegError, IndexError, UserError):
@@ -236,7 +236,7 @@ def rendered(video: Path) -> bool:
     if not video.is_file():
         return False
     try:
-        with av.open(str(video)) as container:
+        with open_video(video) as container:
             return any(SYNTHETIC_LABEL in text for text in container.metadata.values())
-    except av.FFmpegError:
+    except (av.FFmpegError, UserError):
         return False

@@ -5,11 +5,11 @@ from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
 
-import av
 import numpy as np
 import xarray as xr
 
 from pipeline.datasets.tables import TABLES
+from pipeline.tracking.frames import open_video
 from reports.products.tracking.overlay import of_track
 from sim.core import Floats, Image
 
@@ -112,7 +112,7 @@ def stream_of(video: Path) -> StreamProperties:
     """Reads the codec of a video, and how many frames stand alone; pictures have none."""
     if video.is_dir():
         return StreamProperties("pictures", 1.0)
-    with av.open(str(video)) as container:
+    with open_video(video) as container:
         stream = container.streams.video[0]
         alone = [packet.is_keyframe for packet in container.demux(stream) if packet.size]
         return StreamProperties(

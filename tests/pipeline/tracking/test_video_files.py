@@ -9,7 +9,13 @@ import av
 import numpy as np
 import pytest
 
-from pipeline.tracking.frames import BrokenOffError, read_frames, video_length
+from pipeline.tracking.frames import (
+    SYNTHETIC_LABEL,
+    BrokenOffError,
+    read_frames,
+    rendered,
+    video_length,
+)
 from tests.tables import refused
 
 RATE = 30
@@ -18,12 +24,18 @@ PIXELS = {"mjpeg": "yuvj420p", "ffv1": "gray", "apng": "gray"}
 
 
 def written(
-    path: Path, numbers: list[int], codec: str = "libx264", rate: int = RATE, **options: object
+    path: Path,
+    numbers: list[int],
+    codec: str = "libx264",
+    rate: int = RATE,
+    title: str = "",
+    **options: object,
 ) -> Path:
     """Writes one picture at those of the instants of a rate that have these numbers."""
     ahead = {"movflags": "faststart"} if path.suffix == ".mp4" else {}
     kind = "m4v" if codec == "mpeg4" else None  # by its name, an MP4
     with av.open(str(path), "w", kind, options=ahead) as container:
+        container.metadata["title"] = title
         stream = cast("av.VideoStream", container.add_stream(codec, rate=rate))
         stream.options = options
         stream.height, stream.width = FLAT.shape
@@ -184,3 +196,11 @@ def test_a_file_of_a_kind_that_is_not_read_is_told_so(tmp_path: Path) -> None:
     path = written(tmp_path / "a.apng", [0, 1], "apng")
     with refused("of this kind are not read", "video", "ffmpeg -i a.apng -c:v ffv1 a.mkv", path):
         list(read_frames(path))
+
+
+def test_a_name_that_may_be_an_address_hides_no_label(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    named = written(tmp_path / "a.mp4", [0], title=SYNTHETIC_LABEL).rename("10:32.mp4")
+    assert rendered(named)

@@ -198,6 +198,15 @@ def filmed(track: xr.Dataset, folder: Path) -> list[str]:
     return ["--track", str(folder / "track.nc"), "--video", str(folder / "v.mkv")]
 
 
+def test_a_name_that_may_be_an_address_is_read_as_a_file(
+    track: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    filmed(track, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    named = Path("v.mkv").rename("10:32.mkv")
+    assert track_quality.stream_of(named).codec == "ffv1"
+
+
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("frames", [1, 6])
 def test_a_page_of_frames_without_intervals_is_made(
