@@ -23,6 +23,7 @@ from pipeline.runtime import (
 from pipeline.tracking.detect import specimen_orientation
 from pipeline.tracking.frames import (
     SYNTHETIC_LABEL,
+    VIDEOS,
     LoadCellLog,
     Recording,
     frame_count,
@@ -190,7 +191,7 @@ def _there_is_one(out: Path) -> UserError:
 
 
 def _track(path: Path, args: argparse.Namespace) -> None:
-    if path.is_dir() or path.suffix.lower() in import_video.VIDEOS:
+    if path.is_dir() or path.suffix.lower() in VIDEOS:
         remedy = f"python -m pipeline track init {path} --design NC proposes a recording of it"
         raise UserError("a video, where a recording is wanted", file=path, remedy=remedy)
     asked = recordings.load_recording(path)

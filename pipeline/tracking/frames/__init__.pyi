@@ -11,6 +11,7 @@ from .recording import LoadCellLog as LoadCellLog
 from .recording import Recording as Recording
 from .recording import load_recording as load_recording
 from .video import SYNTHETIC_LABEL as SYNTHETIC_LABEL
+from .video import VIDEOS as VIDEOS
 from .video import frame_count as frame_count
 from .video import open_video as open_video
 from .video import orientation_of as orientation_of

@@ -10,7 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from pipeline.problem.fields import fault
 from pipeline.problem.reading import explain_error, yaml_file
 from pipeline.runtime import UserError
-from pipeline.tracking.frames.video import rendered
+from pipeline.tracking.frames.picture_folder import has_pictures
+from pipeline.tracking.frames.video import VIDEOS, rendered
 from sim.core import Floats, Ints
 
 _WANTED = {"name", "grid", "spacing_mm", "ligament_gap_mm", "bias_angle_deg"}
@@ -41,9 +42,6 @@ class _Described(BaseModel):
         return self
 
 
-VIDEOS = (".mp4", ".mkv", ".avi", ".mov")
-
-
 def description(path: Path) -> dict[str, Any]:
     """Reads the description of a video.
 
@@ -72,9 +70,12 @@ def video_of(path: Path) -> Path:
     Raises:
         UserError: there is none.
     """
-    for suffix in (*VIDEOS, ""):
-        if (video := path.with_suffix(suffix)).exists():
+    beside = [one for one in sorted(path.parent.iterdir()) if one.stem == path.stem]
+    for suffix in VIDEOS:
+        if video := next((one for one in beside if one.suffix.lower() == suffix), None):
             return video
+    if (folder := path.with_suffix("")).is_dir() and has_pictures(folder):
+        return folder
     raise UserError("no video beside it", file=path, remedy="name it with --video")
 
 

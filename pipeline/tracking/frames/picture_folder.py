@@ -43,15 +43,24 @@ def pictures(folder: Path) -> list[Path]:
     Raises:
         UserError: there are none.
     """
-    found = [
-        path
-        for path in folder.iterdir()
-        if path.suffix.lower() in _SUFFIXES and not path.name.startswith(".")
-    ]
+    found = _listed(folder)
     if not found:
         remedy = "give a video file, or a folder of numbered .png or .tif files"
         raise UserError("the folder holds no pictures", file=folder, remedy=remedy)
     return sorted(found, key=_numbers)
+
+
+def has_pictures(folder: Path) -> bool:
+    """Tells whether a folder holds pictures."""
+    return bool(_listed(folder))
+
+
+def _listed(folder: Path) -> list[Path]:
+    return [
+        path
+        for path in folder.iterdir()
+        if path.suffix.lower() in _SUFFIXES and not path.name.startswith(".")
+    ]
 
 
 def _numbers(path: Path) -> tuple[list[int], str]:

@@ -9,6 +9,8 @@ import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
+from pipeline.tracking.frames import import_video
+from tests import tables
 from tests.pipeline.conftest import Failing
 from tests.pipeline.tracking.conftest import CLIPS
 from tests.tables import cases
@@ -218,6 +220,26 @@ def test_what_cannot_be_tracked_is_refused(
 @cases("tracking", "words, told")
 def test_what_a_command_lacks_is_told(words: list[str], told: str, failing: Failing) -> None:
     assert told in failing("track", words)
+
+
+@pytest.mark.parametrize("name", ["IMG.MOV", "IMG.MP4", "IMG.cine", "IMG.webm"])
+def test_a_video_beside_its_description_is_found_whatever_its_kind(
+    tmp_path: Path, name: str
+) -> None:
+    (tmp_path / name).touch()
+    (tmp_path / "IMG_2.mp4").touch()
+    assert import_video.video_of(tmp_path / "IMG.yaml") == tmp_path / name
+
+
+def test_a_folder_without_pictures_is_no_video(tmp_path: Path) -> None:
+    """Files of an import lie in a folder of the video's name."""
+    folder = tmp_path / "phone"
+    folder.mkdir()
+    (folder / "phone_design.nc").touch()
+    with tables.refused("no video beside it", remedy="--video"):
+        import_video.video_of(tmp_path / "phone.yaml")
+    (folder / "0001.PNG").touch()
+    assert import_video.video_of(tmp_path / "phone.yaml") == folder
 
 
 @pytest.mark.parametrize("comment", [None, "SYNTHETIC"])
