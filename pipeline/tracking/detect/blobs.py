@@ -15,6 +15,8 @@ _UPRIGHT = 10  # deg
 _NEARLY, _MOST = 0.95, 0.75
 """Scores, over the number of units: of ways to see it that are as good; after which to look no
 further."""
+_SHARES = (0.95, 0.8, 0.67, 0.56, 0.47, 0.39, 0.32, 0.27, 0.22, 1.15)
+"""Sizes of a specimen of unknown scale, over the largest at which all of it is in the picture."""
 _AREA = 3.0
 """A camera that makes units so many times larger or smaller than told sees something else."""
 _BLOB_SIGMA = 0.2
@@ -100,10 +102,7 @@ def detect_lattice(
         same turned, and one of which a part is seen, a unit aside. Upright comes first, mirrored
         last. Their cameras are without distortion.
     """
-    extent = np.ptp(specimen.centre, axis=0) + 2 * specimen.radius.mean()
-    most = min(image.shape[1] / extent[0], image.shape[0] / extent[1])
-    shares = (0.95, 0.8, 0.67, 0.56, 0.47, 0.39, 0.32, 0.27, 0.22, 1.15)
-    scales = [px_per_mm] if px_per_mm else [float(most * share) for share in shares]
+    scales = [px_per_mm] if px_per_mm else _scales(image, specimen)
     found: list[LatticeDetection] = []
     for marked in (True, False):
         for scale in scales:
@@ -116,6 +115,16 @@ def detect_lattice(
             break
     least = _score(found) - (1 - _NEARLY) * specimen.count
     return [one for one in found if one.score >= least]
+
+
+def _scales(image: Picture, specimen: SpecimenOutlines) -> list[float]:
+    """Lists pixels per mm at which to look; last those at which it fits only a quarter turned."""
+    extent = np.ptp(specimen.centre, axis=0) + 2 * specimen.radius.mean()
+    upright, turned = (
+        min(image.shape[1] / wide, image.shape[0] / high) for wide, high in (extent, extent[::-1])
+    )
+    scales = [float(upright * share) for share in _SHARES]
+    return scales + [turned * share for share in _SHARES if turned * share > max(scales)]
 
 
 def _score(ways: list[LatticeDetection]) -> int:

@@ -9,7 +9,7 @@ import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from pipeline.tracking.detect import orientation_text, specimen_orientation
+from pipeline.tracking.detect import detect_lattice, orientation_text, specimen_orientation
 from pipeline.tracking.frames import import_video, read_frames, recording
 from pipeline.tracking.geometry import outlines_of_design
 from pipeline.tracking.reference_frame import (
@@ -91,6 +91,20 @@ def test_a_part_of_a_lattice_is_seen_as_the_recording_says(mirrored: bool) -> No
     specimen = outlines_of_design(import_video.design(GRID))
     ways = recognise(image, specimen, SCALE, RecordingSetup(mirrored=mirrored))
     assert {specimen_orientation(way.camera)[1] for way in ways} == {mirrored}
+
+
+def test_a_long_specimen_is_found_upright_in_an_upright_picture() -> None:
+    """It is larger there than any at which it would fit as it is drawn."""
+    specimen = outlines_of_design(import_video.design(GRID | {"grid": [16, 5]}))
+    middle, scale = specimen.centre.mean(axis=0), 2.4
+    image = np.full((640, 360), 230, np.uint8)
+    for unit, centre in enumerate(specimen.centre):
+        x, y = (specimen.polygon(unit) + centre - middle).T
+        corners = np.stack([180 - scale * y, 320 - scale * x], axis=1)
+        cv2.fillPoly(image, [np.round(16 * corners).astype(np.int32)], (40,), cv2.LINE_AA, 4)
+    (found, *_) = detect_lattice(image, specimen, None)
+    assert len(found.unit) == specimen.count
+    assert "90 deg" in orientation_text(found.camera)
 
 
 @pytest.mark.slow
