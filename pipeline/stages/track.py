@@ -24,8 +24,10 @@ from pipeline.tracking.detect import specimen_orientation
 from pipeline.tracking.frames import (
     SYNTHETIC_LABEL,
     VIDEOS,
+    Frame,
     LoadCellLog,
     Recording,
+    UntimedError,
     frame_count,
     has_uneven_intervals,
     import_video,
@@ -60,6 +62,7 @@ LOG = logging.getLogger(__name__)
 
 _MOVED = "x_px,y_px,u_px,v_px,rotation_deg"
 _ORANGE = (0, 80, 230)  # blue, green, red
+_UNTIMED = "frame_rate: how many pictures were taken in a second; without it they are not tracked"
 
 
 def work(args: argparse.Namespace) -> None:
@@ -103,11 +106,11 @@ def _init(video: Path, args: argparse.Namespace) -> None:
     import cv2
 
     design = datasets.read(args.design, "design")
-    first = next(read_frames(video, rate=1.0), None)
-    if first is None:
-        raise UserError("the video has no frames", file=video, remedy="give another file")
+    first, timed = _first_frame(video, args.start, args.frame_rate)
     scale = None if args.pixel_size is None else 1 / args.pixel_size
-    found = proposal.propose(first.image, design, scale)
+    with found_in(video):
+        found = proposal.propose(first.image, design, scale)
+    doubts = found.doubts if timed else (*found.doubts, _UNTIMED)
     out, drawn = (args.out_dir / f"{video.stem}{end}" for end in (".yaml", "_units.png"))
     if out.exists():
         raise _there_is_one(out)
@@ -118,7 +121,8 @@ def _init(video: Path, args: argparse.Namespace) -> None:
         "structure": found.structure,
         "pixel_size": f"{found.pixel_size:.4g} mm",
         "mirrored": specimen_orientation(found.detection.camera)[1] or None,
-        "window": {"start": "0 s"},
+        "frame_rate": None if args.frame_rate is None else f"{args.frame_rate:.12g} Hz",
+        "window": {"start": f"{args.start:.12g} s"},
         "synthetic": rendered(video) or None,
     }
     note = SYNTHETIC_LABEL if rendered(video) else ""
@@ -127,12 +131,34 @@ def _init(video: Path, args: argparse.Namespace) -> None:
             cv2.imencode(".png", proposal.draw_proposal(first.image, found, note))[1].tobytes()
         )
     with write_atomically(out) as aside:
-        comments = ("What the first frame did not tell:", *found.doubts)
+        comments = ("What the first frame did not tell:", *doubts)
         aside.write_text(recording.recording_yaml(values, comments), encoding="utf-8")
     seen = f"{len(found.detection.unit)} of {found.specimen.count} units, {found.kind}"
     LOG.info("%s: %s, %.4g mm/px; see %s", out, seen, found.pixel_size, drawn)
-    for doubt in found.doubts:
+    for doubt in doubts:
         LOG.info("not told: %s", doubt)
+
+
+def _first_frame(video: Path, start: float, rate: float | None) -> tuple[Frame, bool]:
+    """Reads the first frame of a window, and tells whether its time is known."""
+    if not 0.0 <= start < np.inf:
+        remedy = "give seconds since the file's first frame"
+        raise UserError("no time of the video", key="--start", value=start, remedy=remedy)
+    if rate is not None and not 0.0 < rate < np.inf:
+        remedy = "give frames per second"
+        raise UserError("no rate of frames", key="--frame-rate", value=rate, remedy=remedy)
+    timed = True
+    try:
+        first = next(read_frames(video, start, rate=rate), None)
+    except UntimedError as error:
+        if start:
+            remedy = "tell how many were taken in a second, such as --frame-rate 300"
+            raise UserError(error.what, file=video, key="--frame-rate", remedy=remedy) from error
+        first, timed = next(read_frames(video, rate=1.0), None), False
+    if first is None:
+        remedy = "start earlier" if start else "give another file"
+        raise UserError(f"the video has no frame from {start:g} s on", file=video, remedy=remedy)
+    return first, timed
 
 
 def _pair(*pictures: Path, args: argparse.Namespace) -> None:

@@ -3,6 +3,7 @@ from . import load_cell as load_cell
 from . import recording as recording
 from .frame import BrokenOffError as BrokenOffError
 from .frame import Frame as Frame
+from .frame import UntimedError as UntimedError
 from .frame_times import has_uneven_intervals as has_uneven_intervals
 from .picture import read_picture as read_picture
 from .picture import read_pictures as read_pictures

@@ -31,7 +31,11 @@ def broken_off(path: Path, why: str, count: int, time: float) -> BrokenOffError:
     )
 
 
-def untimed(path: Path, what: str) -> UserError:
-    """Reports a file without times of its frames, for which no rate is given."""
+class UntimedError(UserError):
+    """Tells of a file without times of its frames, for which no rate is given."""
+
+
+def untimed(path: Path, what: str) -> UntimedError:
+    """Reports such a file."""
     remedy = "add how many were taken in a second, such as frame_rate: '300 Hz'"
-    return UserError(what, file=path, key="frame_rate", remedy=remedy)
+    return UntimedError(what, file=path, key="frame_rate", remedy=remedy)

@@ -56,7 +56,7 @@ def recognise(
         raise UserError(
             "the first frame is black or without contrast",
             key="window.start",
-            remedy="start where the specimen is lit",
+            remedy="start (of track init: --start) where the specimen is lit",
         )
     found = detect_lattice(image, specimen, px_per_mm)
     if px_per_mm is not None and not _enough(found[0], specimen):
@@ -156,7 +156,7 @@ def _another_design(seen: str) -> UserError:
         f"the first frame does not show this design: {seen}",
         key="design",
         remedy="give the design of the specimen, its structure and its pixel_size, and start the"
-        " window where all of it is seen, at rest",
+        " window (of track init: --start) where all of it is seen, at rest",
     )
 
 

@@ -18,6 +18,7 @@ from pipeline.tracking.reference_frame import (
     proposal,
     recognise,
 )
+from tests.pipeline.conftest import Failing
 from tests.pipeline.tracking.conftest import CLIPS
 from tests.pipeline.virtual_lab.conftest import GRID, film_of
 
@@ -50,11 +51,48 @@ def test_units_outside_the_first_frame_are_told() -> None:
     assert any("units lie outside the first frame" in doubt for doubt in doubts)
 
 
-def test_a_proposal_says_that_it_is_mirrored(tmp_path: Path) -> None:
+@pytest.fixture
+def words(tmp_path: Path) -> list[str]:
+    """Options that name a folder and the design in it."""
     design = tmp_path / "design.nc"
     origin = {"problem": "{}", "problem_hash": "", "parents": "{}"}
     datasets.write(import_video.design(GRID), design, "design", origin)
-    words = ["--out-dir", str(tmp_path), "--design", str(design)]
+    return ["--out-dir", str(tmp_path), "--design", str(design)]
+
+
+def covered_at_first(folder: Path) -> Path:
+    """Writes a film whose first two pictures show a cap before the lens."""
+    folder.mkdir()
+    image = next(film_of("bare").images())
+    for number, shown in enumerate((np.zeros_like(image), np.zeros_like(image), image)):
+        assert cv2.imwrite(str(folder / f"{number}.png"), shown)
+    return folder
+
+
+def test_a_video_is_looked_at_where_the_specimen_is_seen(
+    tmp_path: Path, words: list[str], failing: Failing
+) -> None:
+    told = ["init", str(covered_at_first(tmp_path / "film")), *words]
+    assert "--start" in failing("track", told)
+    assert "--frame-rate 300" in failing("track", [*told, "--start", "0.02"])
+    assert "start earlier" in failing("track", [*told, "--start", "9", "--frame-rate", "100"])
+    assert "since the file's first frame" in failing("track", [*told, "--start", "-1"])
+    assert "frames per second" in failing("track", [*told, "--frame-rate", "0"])
+    assert run_stage("track", [*told, "--start", "0.02", "--frame-rate", "100"]) == 0
+    made = recording.load_recording(tmp_path / "film.yaml")
+    assert (made.window.start, made.frame_rate) == (0.02, 100.0)
+    assert "# frame_rate" not in (tmp_path / "film.yaml").read_text(encoding="utf-8")
+
+
+def test_of_pictures_a_proposal_asks_for_the_rate(tmp_path: Path, words: list[str]) -> None:
+    folder = covered_at_first(tmp_path / "film")
+    for name in ("0.png", "1.png"):
+        (folder / name).unlink()
+    assert run_stage("track", ["init", str(folder), *words]) == 0
+    assert "# frame_rate: how many" in (tmp_path / "film.yaml").read_text(encoding="utf-8")
+
+
+def test_a_proposal_says_that_it_is_mirrored(tmp_path: Path, words: list[str]) -> None:
     for name, step in (("plain", 1), ("behind", -1)):
         (tmp_path / name).mkdir()
         image = np.ascontiguousarray(next(film_of("bare").images())[:, ::step])
