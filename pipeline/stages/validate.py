@@ -86,7 +86,9 @@ def _constants(args: argparse.Namespace) -> None:
 def _cycles(args: argparse.Namespace) -> None:
     asked, folder = load_section(args.file, LoadCycles), args.file.parent
     made = study_cycles(asked, folder)
-    datasets.write(made, args.out, "load_cycles", _origin(asked, folder, "load_cycles"))
+    synthetic = has_synthetic(asked.records, folder)
+    origin = _origin(asked, folder, "load_cycles", synthetic=synthetic)
+    datasets.write(made, args.out, "load_cycles", origin)
     LOG.info("%d snaps in %d records", made.sizes["snap"], made.sizes["record"])
 
 

@@ -5,8 +5,12 @@ from pathlib import Path
 
 from pipeline import datasets, problem
 from pipeline.calibration.inputs.description import Calibration, MeasurementSet, TrackedMotion
+from pipeline.calibration.inputs.load_cycles import CycleRecord
 from pipeline.calibration.inputs.population import SampleTest
-from pipeline.problem.fields import named_files
+from pipeline.problem.fields import csv_columns, named_files
+
+_SYNTHETIC = "SYNTHETIC"
+"""Stands above the numbers of a CSV that was computed, or is of a rendered video."""
 
 
 def source_files(asked: Calibration, folder: Path) -> dict[str, Path]:
@@ -30,15 +34,16 @@ def source_files(asked: Calibration, folder: Path) -> dict[str, Path]:
     return found
 
 
-def has_synthetic(sets: Iterable[MeasurementSet | SampleTest], folder: Path) -> bool:
-    """Tells whether any set in a folder is a track that was rendered or computed, not filmed.
+def has_synthetic(sets: Iterable[MeasurementSet | SampleTest | CycleRecord], folder: Path) -> bool:
+    """Tells whether any set in a folder was rendered or computed: its track or CSV says so.
 
     Raises:
-        UserError: a track cannot be read.
+        UserError: a file cannot be read.
     """
-    tracks = [
-        folder / each.file
-        for each in sets
-        if each.file is not None and (isinstance(each, TrackedMotion) or each.file.endswith(".nc"))
-    ]
-    return any(datasets.read_attributes(path).get("synthetic") == "yes" for path in tracks)
+    return any(_is_synthetic(each, folder / each.file) for each in sets if each.file is not None)
+
+
+def _is_synthetic(each: MeasurementSet | SampleTest | CycleRecord, path: Path) -> bool:
+    if isinstance(each, TrackedMotion) or path.suffix == ".nc":
+        return datasets.read_attributes(path).get("synthetic") == "yes"
+    return any(_SYNTHETIC in line for line in csv_columns.read_preamble(path))

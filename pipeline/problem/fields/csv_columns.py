@@ -6,7 +6,7 @@ import csv
 import math
 import re
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -55,12 +55,7 @@ def read_cells(path: Path) -> CsvCells:
     Raises:
         UserError: no such file, too large, or no CSV.
     """
-    try:
-        lines = read_bounded(path, _LARGEST).decode("utf-8-sig", errors="replace").splitlines()
-    except FileNotFoundError as error:
-        raise UserError("no such file", file=path, remedy="check the path") from error
-    except OSError as error:
-        raise refusal(path, error) from error
+    lines = _lines(path)
     separator = _separator(lines)
     rows = csv.reader(lines, delimiter=separator)
     try:
@@ -68,6 +63,24 @@ def read_cells(path: Path) -> CsvCells:
     except csv.Error as error:
         remedy = "give plain columns of numbers"
         raise UserError(f"not a readable CSV: {error}", file=path, remedy=remedy) from error
+
+
+def read_preamble(path: Path) -> list[str]:
+    """Reads the lines above the first one of numbers: comments and the heading.
+
+    Raises:
+        UserError: no such file, or too large.
+    """
+    return [*takewhile(lambda line: not _NUMBERS.match(line), _lines(path))]
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return read_bounded(path, _LARGEST).decode("utf-8-sig", errors="replace").splitlines()
+    except FileNotFoundError as error:
+        raise UserError("no such file", file=path, remedy="check the path") from error
+    except OSError as error:
+        raise refusal(path, error) from error
 
 
 def _separator(lines: list[str]) -> str:

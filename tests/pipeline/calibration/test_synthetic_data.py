@@ -1,4 +1,4 @@
-"""Tests that what is found from a rendered or computed track is told as synthetic."""
+"""Tests that what is found from rendered or computed data is told as synthetic."""
 
 from pathlib import Path
 
@@ -8,11 +8,17 @@ import pytest
 from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.calibration import calibration_dataset
-from pipeline.calibration.inputs import Population, has_synthetic
+from pipeline.calibration.inputs import Calibration, LoadCycles, Population, has_synthetic
 from pipeline.problem.reading import load_section
 from pipeline.runtime import ROOT
 from pipeline.stages import calibrate, validate
-from tests.pipeline.calibration.specimens import LATTICE, described, written
+from tests.pipeline.calibration.specimens import (
+    LATTICE,
+    described,
+    force_sets,
+    synthesised,
+    written,
+)
 from tests.pipeline.samples import sample
 
 PROBLEM = str(ROOT / "experiments/calibration/specimens/squeezed.yaml")
@@ -65,3 +71,28 @@ def test_constants_drawn_from_a_synthetic_track_say_so(
     out = tmp_path / "constants.csv"
     assert run_stage("validate", ["constants", str(HINGES), "--out", str(out), "--quiet"]) == 0
     assert out.read_text().startswith("# SYNTHETIC: found from computed data")
+
+
+def test_computed_curves_are_told_without_their_calibration(tmp_path: Path) -> None:
+    path = synthesised(tmp_path, described(force_sets(points=3)[2:], ["shear_stiffness"]))
+    asked = load_section(path, Calibration)
+    assert has_synthetic(asked.data, path.parent)
+    table = path.parent / "shear.csv"
+    one = load_section(HINGES, Population).data[0].model_copy(update={"file": str(table)})
+    assert has_synthetic((one,), HINGES.parent)
+    table.write_text(table.read_text().partition("\n")[2])
+    assert not has_synthetic((one,), HINGES.parent)
+
+
+def test_cycles_of_computed_records_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = load_section(HINGES.parent / "morpher.yaml", LoadCycles)
+    assert not has_synthetic(asked.records, HINGES.parent)
+    (tmp_path / "one.csv").write_text("# SYNTHETIC: computed\napproach (mm),tension (N)\n0,0\n")
+    record = asked.records[2].model_copy(update={"file": str(tmp_path / "one.csv")})
+    changed = asked.model_copy(update={"records": (record,)})
+    monkeypatch.setattr(validate, "load_section", lambda *_: changed)
+    monkeypatch.setattr(validate, "study_cycles", lambda *_: sample("load_cycles"))
+    out = tmp_path / "cycles.nc"
+    words = ["cycles", str(HINGES.parent / "morpher.yaml"), "--out", str(out), "--quiet"]
+    assert run_stage("validate", words) == 0
+    assert datasets.read_attributes(out)["synthetic"] == "yes"
