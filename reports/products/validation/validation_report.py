@@ -25,6 +25,8 @@ from sim.core import Floats
 
 NOTABLE = 0.1
 """Part of the residual from which a mechanism is named."""
+_COLUMNS = 5
+"""Displacements at which errors are told."""
 
 
 def report(args: argparse.Namespace) -> None:
@@ -84,7 +86,7 @@ def _of_samples(made: xr.Dataset, asked: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "headline": list(_headline(made)),
         "shown": {
-            "errors": _errors(made),
+            "errors": prediction_errors(made),
             "constants": _constants(made),
             "scales": _scales(made),
             "left_out": _left_out(made),
@@ -162,21 +164,22 @@ def _signed(made: xr.Dataset) -> str:
     return "above the measured force everywhere" if (error > 0).all() else "of both signs"
 
 
-def _errors(made: xr.Dataset) -> PageTable:
-    rows = []
+def prediction_errors(made: xr.Dataset) -> PageTable:
+    """Tabulates errors of the predictions at displacements from the first to the last measured."""
+    displacement, rows = made["displacement"].values, []
+    at = np.unique(np.linspace(0, len(displacement) - 1, _COLUMNS).round().astype(int))
     for name, what in (
         ("median", "this fit, of the small specimens alone (median)"),
         ("doubled_median", "the same with priors twice as wide"),
         ("simulated", "the authors’ simulation"),
     )[: 3 if is_simulated(made) else 2]:
-        error = relative_error(made, name)
-        at = [np.interp(x, made["displacement"], 100 * error) for x in (0.5, 1, 2, 3, 4)]
+        error = 100 * relative_error(made, name)[at]
         band = {"median": ("low", "high"), "doubled_median": ("doubled_low", "doubled_high")}
         ends = [made[end].values[-1] for end in band.get(name, ())]
         told = f"{ends[0]:.1f} to {ends[1]:.1f} N" if ends else "none"
-        rows.append([what, _rms(made, name), *(f"{value:+.1f} %" for value in at), told])
-    heads = ["Prediction", "rms", *(f"at {x} mm" for x in (0.5, 1, 2, 3, 4)), "Band at the end"]
-    return PageTable(heads, rows)
+        rows.append([what, _rms(made, name), *(f"{value:+.1f} %" for value in error), told])
+    heads = [f"at {x:.3g} mm" for x in displacement[at]]
+    return PageTable(["Prediction", "rms", *heads, "Band at the end"], rows)
 
 
 def _constants(made: xr.Dataset) -> PageTable:

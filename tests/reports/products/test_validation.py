@@ -13,7 +13,7 @@ from pipeline.problem.reading import load_section
 from pipeline.runtime import ROOT, UserError
 from reports.__main__ import main
 from reports.products.validation.pictures import pictures_of_frames
-from reports.products.validation.validation_report import relative_error
+from reports.products.validation.validation_report import prediction_errors, relative_error
 from tests.reports.conftest import Failing
 
 FOLDER = ROOT / "experiments/validation"
@@ -96,6 +96,15 @@ def test_it_tells_the_errors_and_their_sign(page: str) -> None:
     assert "the median is below the measured force everywhere" in page
     rms = 100 * np.sqrt((relative_error(made_up(), "median") ** 2).mean())
     assert f"<strong>{rms:.1f} %</strong><span>error of the median" in page
+
+
+def test_errors_are_told_where_the_curve_was_measured() -> None:
+    made = made_up().assign(displacement=("predicted", np.array([0.2, 0.4, 1.0, 2.0])))
+    table = prediction_errors(made)
+    heads = ["at 0.2 mm", "at 0.4 mm", "at 1 mm", "at 2 mm"]
+    assert table.columns == ["Prediction", "rms", *heads, "Band at the end"]
+    error = 100 * relative_error(made, "median")
+    assert table.rows[0][2:-1] == [f"{value:+.1f} %" for value in error]
 
 
 def test_pictures_are_those_of_the_frames(tmp_path: Path) -> None:
