@@ -1,6 +1,6 @@
 """Describes tests of several samples, what is known of their constants, and a test to predict."""
 
-from typing import Annotated, Self
+from typing import Annotated, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -60,8 +60,8 @@ class SampleTest(Section):
 
     @property
     def name(self) -> str:
-        """Names the curve by its test and samples."""
-        return "_".join((self.test, *self.samples))
+        """Names the curve by its test and samples, joined by a sign that no label holds."""
+        return f"{self.test}_{'+'.join(self.samples)}"
 
 
 class PredictedTest(SampleTest):
@@ -164,6 +164,9 @@ class Population(Section):
                 "give tests of two samples or more; one alone is for python -m pipeline calibrate"
             )
             raise fault("one sample tells nothing of the others", remedy, "data")
+        if taken := {"doubled", *get_args(TestKind)} & set(self.samples):
+            remedy = "name it otherwise: fits without a sample or a kind of test go by their names"
+            raise fault(f"a sample is named {min(taken)}", remedy, "data")
         if self.predict.test not in {each.test for each in self.data}:
             remedy = "give sets of that kind, or predict a test of another"
             raise fault(f"no set of data is of the kind {self.predict.test}", remedy, "predict")

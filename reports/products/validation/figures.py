@@ -39,10 +39,10 @@ def _fit(axes: Axes, made: xr.Dataset, test: str) -> None:
     curves, samples = made["curve"].values.astype(str), made["sample"].values.tolist()
     for curve in dict.fromkeys(name for name in curves if name.startswith(f"{test}_")):
         mine = curves == curve
-        names = curve.removeprefix(f"{test}_").split("_")
-        single = len(names) == 1
-        colour = COLOURS[samples.index(names[0]) % len(COLOURS)] if single else style.INTACT
-        label = f"sample {names[0]}" if single else "mean"
+        name = curve.removeprefix(f"{test}_")
+        single = name in samples
+        colour = COLOURS[samples.index(name) % len(COLOURS)] if single else style.INTACT
+        label = f"sample {name}" if single else "mean"
         x, y = made["point_displacement"].values[mine], made["point_force"].values[mine]
         axes.plot(x, y, "o", color=colour, markersize=2.4, markeredgewidth=0, label=label)
     fitted = made.isel(test=made["test"].values.tolist().index(test))

@@ -217,7 +217,7 @@ def _left_out(made: xr.Dataset) -> PageTable:
     rows = [
         [
             without,
-            curve.replace("_", " "),
+            curve.replace("_", " ", 1),
             "in" if inside else "out",
             f"{100 * np.expm1(deviation):+.1f} %",
             f"±{100 * np.expm1(half):.0f} %",

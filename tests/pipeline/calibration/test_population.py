@@ -9,7 +9,7 @@ from scipy.special import stdtrit
 
 from pipeline.__main__ import run_stage
 from pipeline.calibration.experiments import force_displacement
-from pipeline.calibration.inputs import ELASTIC_NAMES, Constants, Population
+from pipeline.calibration.inputs import ELASTIC_NAMES, Constants, Population, SampleTest
 from pipeline.calibration.inputs.description import TestKind
 from pipeline.calibration.population import (
     curve_emulator,
@@ -74,7 +74,7 @@ def curves(*factors: float) -> list[SampleCurve]:
         for name, factor in zip(SAMPLES, factors, strict=True)
     ]
     mean = np.mean(factors) * np.sqrt(way)
-    return [*own, SampleCurve("compression_s1_s2", "compression", SAMPLES, way, mean)]
+    return [*own, SampleCurve("compression_s1+s2", "compression", SAMPLES, way, mean)]
 
 
 @pytest.mark.slow
@@ -98,7 +98,7 @@ def test_readings_are_thinned_and_shared(emulator: CurveEmulator) -> None:
     known: Mapping[TestKind, CurveEmulator] = {"compression": emulator}
     found, names = sample_readings.stack_readings(curves(1.0, 1.2), known, SAMPLES, 5)
     assert found.used.shape == (1, 15)
-    assert names[0][::5] == ["compression_s1", "compression_s2", "compression_s1_s2"]
+    assert names[0][::5] == ["compression_s1", "compression_s2", "compression_s1+s2"]
     np.testing.assert_allclose(
         np.asarray(found.shares)[0, ::5], np.array([[1, 0], [0, 1], [0.5, 0.5]])
     )
@@ -200,6 +200,14 @@ def test_slips_in_the_file(old: str, new: str, told: str, tmp_path: Path) -> Non
     with refused("") as caught:
         load_section(tmp_path / "hinges.yaml", Population)
     assert told in str(caught.value)
+
+
+def test_a_mean_is_no_sample_of_both_their_names() -> None:
+    names = [
+        SampleTest(test="shear", samples=samples, file="one.csv").name
+        for samples in (("a_b",), ("a", "b"))
+    ]
+    assert names == ["shear_a_b", "shear_a+b"]
 
 
 def test_a_force_of_the_wrong_sign_is_refused(asked: Population, tmp_path: Path) -> None:

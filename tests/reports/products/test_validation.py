@@ -12,6 +12,8 @@ from pipeline.datasets.tables import TABLES
 from pipeline.problem.reading import load_section
 from pipeline.runtime import ROOT, UserError
 from reports.__main__ import main
+from reports.base import style
+from reports.products.validation.figures import COLOURS, draw_samples
 from reports.products.validation.pictures import pictures_of_frames
 from reports.products.validation.validation_report import prediction_errors, relative_error
 from tests.reports.conftest import Failing
@@ -105,6 +107,19 @@ def test_errors_are_told_where_the_curve_was_measured() -> None:
     assert table.columns == ["Prediction", "rms", *heads, "Band at the end"]
     error = 100 * relative_error(made, "median")
     assert table.rows[0][2:-1] == [f"{value:+.1f} %" for value in error]
+
+
+def test_points_are_of_samples_whatever_their_names() -> None:
+    """Holds for labels with an underscore, of which the mean over both is none."""
+    curves = [f"shear_{name}" for name in ("run_1", "run_2", "run_1+run_2")]
+    others = [f"{test}_run_{k}" for k, test in enumerate(TESTS, 1)]
+    made = made_up().assign(curve=("point", [*curves, *others]))
+    made = made.assign_coords(sample=["run_1", "run_2", "run_3"])
+    panel = draw_samples(made).axes[TESTS.index("shear")]
+    points = panel.get_lines()[:4]
+    labels = [f"sample run_{k}" for k in (1, 2)]
+    assert [each.get_label() for each in points] == [*labels, "mean", "sample run_3"]
+    assert [each.get_color() for each in points] == [*COLOURS[:2], style.INTACT, COLOURS[2]]
 
 
 def test_pictures_are_those_of_the_frames(tmp_path: Path) -> None:
