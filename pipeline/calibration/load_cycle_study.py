@@ -126,6 +126,7 @@ class MeasuredCycle(NamedTuple):
     scatter: tuple[Floats, Floats]
     snaps: tuple[list[Snap], list[Snap]]
     loops: Floats
+    first: bool  # whether the means are over the first cycle as well
 
 
 def measure_cycle(record: CycleRecord, folder: Path) -> MeasuredCycle:
@@ -139,7 +140,8 @@ def measure_cycle(record: CycleRecord, folder: Path) -> MeasuredCycle:
     branches = load_cycles.split_branches(*csv_columns.read_quantities(path, wanted, 10).T)
     reach = max((np.ptp(each.displacement) for each in branches), default=0.0)
     full = [each for each in branches if np.ptp(each.displacement) > load_cycles.WHOLE * reach]
-    kept = full[2:] if record.first == "dropped" and len(full) > 3 else full
+    first = record.first == "kept" or len(full) < 4
+    kept = full if first else full[2:]
     ways = [[each for each in kept if each.loading == rises] for rises in (True, False)]
     if not all(ways):
         remedy = "give a record that goes there and back at least once"
@@ -147,7 +149,8 @@ def measure_cycle(record: CycleRecord, folder: Path) -> MeasuredCycle:
         raise UserError(what, file=path, key=record.columns.displacement, remedy=remedy)
     (closing, scatter), (opening, other) = (load_cycles.mean_branch(each) for each in ways)
     snaps = load_cycles.find_snaps(closing), load_cycles.find_snaps(opening)
-    return MeasuredCycle(closing, opening, (scatter, other), snaps, load_cycles.loop_areas(full))
+    loops = load_cycles.loop_areas(full)
+    return MeasuredCycle(closing, opening, (scatter, other), snaps, loops, first)
 
 
 def study_cycles(asked: LoadCycles, folder: Path) -> xr.Dataset:
@@ -161,9 +164,11 @@ def study_cycles(asked: LoadCycles, folder: Path) -> xr.Dataset:
     snaps: list[tuple[int, int, Snap]] = []
     loops: list[tuple[int, float]] = []
     checks: list[Floats] = [np.empty((0, 1 + len(CHECKED)))]
+    first = np.zeros(len(asked.records), np.int8)
     misfit, jumps, reversals = np.full((3, len(asked.records)), np.nan)
     for k, record in enumerate(asked.records):
         seen = measure_cycle(record, folder)
+        first[k] = seen.first
         for role, branch in enumerate((seen.closing, seen.opening)):
             curves.append((k, role, branch.displacement, branch.force, seen.scatter[role]))
             snaps += [(k, role, each) for each in seen.snaps[role]]
@@ -201,6 +206,7 @@ def study_cycles(asked: LoadCycles, folder: Path) -> xr.Dataset:
         "snap_rest": ("snap", ends[:, 3]),
         "record_of_loop": ("loop", np.array([each[0] for each in loops], int)),
         "loop_area": ("loop", np.array([each[1] for each in loops])),
+        "first": ("record", first),
         "misfit": ("record", misfit),
         "jumps": ("record", jumps),
         "reversals": ("record", reversals),

@@ -35,7 +35,7 @@ class CycleRecord(Section):
         title: in words.
         file: a CSV with a heading.
         columns: of the file.
-        first: whether the first cycle counts as well; by default it is left out.
+        first: whether the first cycle counts as well; by default it is left out where there are more.
         material: of the simulation by the drive; without it there is none.
         contact: likewise.
         play: of the clamps: by so much they move while they transmit no force.

@@ -120,7 +120,9 @@ def draw_cycles(made: xr.Dataset) -> Figure:
     for k in range(count):
         row, column = divmod(k, 2)
         left, top = 12.0 + 89.0 * column, 58.0 * row
-        style.letter(drawn, left - 10.0, top + 1.0, "abcdefgh"[k], str(made["title"].values[k]))
+        style.letter(
+            drawn, left - 10.0, top + 1.0, style.numbered_letter(k), str(made["title"].values[k])
+        )
         axes = style.place(drawn, left, top + 8.0, 72.0, 40.0)
         seen = _draw_ways(axes, made, k)
         snaps = made["record_of_snap"].values == k

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -56,7 +57,8 @@ def report(args: argparse.Namespace) -> None:
     if (cycles := made.get("load_cycles")) is not None:
         figures["cycles"] = lambda: draw_cycles(cycles)
         simulated = bool(np.isfinite(cycles["misfit"]).any())
-        values |= {"cycles": _cycles(cycles), "simulated_cycles": simulated}
+        values |= {"cycles": cycle_table(cycles), "simulated_cycles": simulated}
+        values["averaged"] = averaged_cycles(cycles)
         values |= {"checks": _checks(cycles), "reversals": np.nansum(cycles["reversals"]) > 0}
         values["cycles_doc"] = asked["load_cycles"]["doc"]
     values["sources"] = [each["source"] for each in asked.values() if "source" in each]
@@ -69,11 +71,11 @@ def report(args: argparse.Namespace) -> None:
         values["tracked"] = pictures.error_table(seen)
         values["sources"] += [asked["pictures"][k]["source"] for k in ("rigid_parts", "specimen")]
     values["synthetic"] = any(each.attrs["synthetic"] == "yes" for each in made.values())
-    files = [path.name for path in given.values() if path is not None]
-    values["files"] = files
+    files = [path for path in given.values() if path is not None]
+    values["files"] = [Path(os.path.relpath(path, args.out_dir)).as_posix() for path in files]
     values["provenance"] = sorted(
-        (f"{name}: {key}", str(value))
-        for name, each in zip(files, made.values(), strict=True)
+        (f"{path.name}: {key}", str(value))
+        for path, each in zip(files, made.values(), strict=True)
         for key, value in each.attrs.items()
         if key not in given
     )
@@ -272,7 +274,17 @@ def _mechanisms(made: xr.Dataset) -> PageTable:
     return PageTable([*heads, "If in this test alone", "Size that explains most"], rows)
 
 
-def _cycles(made: xr.Dataset) -> PageTable:
+def averaged_cycles(made: xr.Dataset) -> str:
+    """Tells which cycles the drawn ways are means over."""
+    kept = made["title"].values[made["first"].values > 0].tolist()
+    if len(kept) == made.sizes["record"]:
+        return "all cycles"
+    more = f" (with it: {', '.join(kept)})" if kept else ""
+    return f"the cycles without the first{more}"
+
+
+def cycle_table(made: xr.Dataset) -> PageTable:
+    """Tabulates snaps, loop areas and misfits of the equilibria by record."""
     rows = []
     for k, title in enumerate(made["title"].values.tolist()):
         areas = made["loop_area"].values[made["record_of_loop"].values == k]
@@ -297,7 +309,8 @@ def _cycles(made: xr.Dataset) -> PageTable:
         told = "not simulated"
         if not np.isnan(misfit):
             told = f"{misfit:.2f} N; {jumps[0]:.0f} jumps, {jumps[1]:.0f} of them reversals"
-        loops = f"{areas[0]:.1f} first, {areas[1:].mean():.1f} later"
+        later = f", {areas[1:].mean():.1f} later" if len(areas) > 1 else ""
+        loops = f"{areas[0]:.1f} first{later}"
         rows.append([title, "; ".join(snaps) or "none", loops, told])
     return PageTable(
         ["Test", "Snaps", "Loop areas, N mm", "Misfit of equilibria, rms; their jumps"], rows

@@ -1,3 +1,4 @@
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,12 @@ from reports.__main__ import main
 from reports.base import style
 from reports.products.validation.figures import COLOURS, draw_samples
 from reports.products.validation.pictures import pictures_of_frames
-from reports.products.validation.validation_report import prediction_errors, relative_error
+from reports.products.validation.validation_report import (
+    averaged_cycles,
+    cycle_table,
+    prediction_errors,
+    relative_error,
+)
 from tests.reports.conftest import Failing
 
 FOLDER = ROOT / "experiments/validation"
@@ -120,6 +126,49 @@ def test_points_are_of_samples_whatever_their_names() -> None:
     labels = [f"sample run_{k}" for k in (1, 2)]
     assert [each.get_label() for each in points] == [*labels, "mean", "sample run_3"]
     assert [each.get_color() for each in points] == [*COLOURS[:2], style.INTACT, COLOURS[2]]
+
+
+def cycled(folder: Path, counts: Sequence[int]) -> tuple[LoadCycles, xr.Dataset]:
+    """Records so many cycles each, to 2 mm and back, without equilibria beside them."""
+    asked = load_section(FOLDER / "morpher.yaml", LoadCycles)
+    records = []
+    for k, count in enumerate(counts):
+        way = np.concatenate([np.linspace(0, 2, 41), np.linspace(2, 0, 41)[1:]] * count)
+        lines = "\n".join(f"{x},{3 * x}" for x in way)
+        (folder / f"{k}.csv").write_text(f"approach (mm),tension (N)\n{lines}\n")
+        named = {"name": f"r{k}", "title": f"record {k}", "file": str(folder / f"{k}.csv")}
+        records.append(asked.records[2].model_copy(update=named))
+    asked = asked.model_copy(update={"records": tuple(records)})
+    return asked, study_cycles(asked, folder)
+
+
+@pytest.mark.parametrize(
+    ("counts", "told"),
+    [
+        ([3, 2], "the cycles without the first"),
+        ([3, 1], "the cycles without the first (with it: record 1)"),
+        ([1], "all cycles"),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_a_lone_cycle_is_told_as_such(counts: list[int], told: str, tmp_path: Path) -> None:
+    made = cycled(tmp_path, counts)[1]
+    assert averaged_cycles(made) == told
+    loops = [row[2] for row in cycle_table(made).rows]
+    assert [", " in each for each in loops] == [count > 1 for count in counts]
+
+
+def test_cycles_are_drawn_of_many_records_and_linked_where_they_are(tmp_path: Path) -> None:
+    asked, made = cycled(tmp_path, [1] * 9)
+    origin = provenance.of_recording(
+        asked.model_dump_json(), {}, synthetic=False, role="load_cycles"
+    )
+    datasets.write(made, tmp_path / "one.nc", "load_cycles", origin)
+    words = ["--cycles", str(tmp_path / "one.nc"), "--out-dir", str(tmp_path / "page/here")]
+    assert main(["validation", *words, "--quiet"]) == 0
+    page = (tmp_path / "page/here/index.html").read_text()
+    assert 'href="../../one.nc"' in page
+    assert "Mean over all cycles, grey" in page
 
 
 def test_pictures_are_those_of_the_frames(tmp_path: Path) -> None:
