@@ -26,6 +26,13 @@ class PathDrive(Section):
     driven: Unit
     file: File
 
+    @model_validator(mode="after")
+    def _two_units(self) -> Self:
+        if self.held == self.driven:
+            what = "the unit that moves is held"
+            raise fault(what, "give the numbers of two units", "driven")
+        return self
+
 
 class CycleRecord(Section):
     """The record of a testing machine over several cycles.
@@ -35,7 +42,7 @@ class CycleRecord(Section):
         title: in words.
         file: a CSV with a heading.
         columns: of the file.
-        first: whether the first cycle counts as well; by default it is left out where there are more.
+        first: whether the first cycle counts as well; by default only where it is alone.
         material: of the simulation by the drive; without it there is none.
         contact: likewise.
         play: of the clamps: by so much they move while they transmit no force.
@@ -83,3 +90,12 @@ class LoadCycles(Section):
     lattice: Specimen
     drive: PathDrive
     records: Annotated[tuple[CycleRecord, ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _units_of_the_lattice(self) -> Self:
+        count = self.lattice.n_units
+        for name in ("held", "driven"):
+            if (unit := getattr(self.drive, name)) >= count:
+                what = f"no unit {unit}: the lattice has {count}, numbered from 0"
+                raise fault(what, f"give a number of at most {count - 1}", f"drive.{name}")
+        return self

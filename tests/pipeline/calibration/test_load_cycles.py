@@ -59,6 +59,26 @@ def test_what_no_simulation_takes_is_refused(
         load_section(tmp_path / "morpher.yaml", LoadCycles)
 
 
+@pytest.mark.parametrize(
+    ("changed", "key", "told"),
+    [
+        ({"held": 280}, "drive.held", "no unit 280: the lattice has 64, numbered from 0"),
+        ({"driven": 64}, "drive.driven", "no unit 64: the lattice has 64, numbered from 0"),
+        ({"held": 35}, "drive.driven", "the unit that moves is held"),
+    ],
+)
+def test_a_drive_of_units_that_are_not_there_is_refused(
+    changed: dict[str, int], key: str, told: str, tmp_path: Path
+) -> None:
+    data = yaml.safe_load((FOLDER / "morpher.yaml").read_text())
+    data["lattice"]["file"] = str(FOLDER / data["lattice"]["file"])
+    data["drive"] |= changed
+    path = tmp_path / "morpher.yaml"
+    path.write_text(yaml.safe_dump(data))
+    with refused(told, key, file=path):
+        load_section(path, LoadCycles)
+
+
 def test_branches_and_loops_of_a_record() -> None:
     branches = load_cycles.split_branches(*cycles())
     assert [each.loading for each in branches] == [True, False] * 3
