@@ -5,7 +5,7 @@ from typing import Annotated, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from pipeline.calibration.inputs.population import MeasurementSource
-from pipeline.problem.fields import File, Length, Section, fault
+from pipeline.problem.fields import Angle, File, Length, Section, fault
 from pipeline.problem.sections import Lattice
 
 Inside = Annotated[str, StringConstraints(pattern=r"^[^/\\]+$")]
@@ -39,6 +39,8 @@ class RigidParts(Section):
         reference: a CSV beside the pictures, with the other program's motion.
         columns: of it: number in the picture's name, number of the part, shift to the right and
             down in px, rotation in rad from right to down.
+        program: name of the other program.
+        accuracy: px and angle that its motion is good to; without it agreement is not judged.
     """
 
     source: MeasurementSource
@@ -47,6 +49,13 @@ class RigidParts(Section):
     parts: Annotated[tuple[RigidPart, ...], Field(min_length=1)]
     reference: Inside
     columns: tuple[str, str, str, str, str] = ("frame", "part", "u_px", "v_px", "rotation_rad")
+    program: str = "the other program"
+    accuracy: tuple[Annotated[Pixels, Field(gt=0.0)], Annotated[Angle, Field(gt=0.0)]] | None = None
+
+    @property
+    def bounds(self) -> tuple[float, float, float] | None:
+        """Returns what motions are good to: px, px, rad."""
+        return self.accuracy and (self.accuracy[0], *self.accuracy)
 
     @model_validator(mode="after")
     def _told_apart(self) -> Self:

@@ -15,7 +15,11 @@ from pipeline.runtime import ROOT, UserError
 from reports.__main__ import main
 from reports.base import style
 from reports.products.validation.figures import COLOURS, draw_samples
-from reports.products.validation.pictures import pictures_of_frames
+from reports.products.validation.pictures import (
+    error_table,
+    picture_facts,
+    pictures_of_frames,
+)
 from reports.products.validation.validation_report import (
     averaged_cycles,
     cycle_table,
@@ -100,6 +104,7 @@ def test_it_tells_the_errors_and_their_sign(page: str) -> None:
     assert "4.41 mm, -6.68 N to 5.05 mm, -0.07 N" in page
     assert page.count("not simulated") == 2
     assert "340 of 384 units are found" in page
+    assert "The motion by DICe is good to some 0.03 px and 0.002 rad" in page
     assert "all parts agree with it within that" in page
     assert "the median is below the measured force everywhere" in page
     rms = 100 * np.sqrt((relative_error(made_up(), "median") ** 2).mean())
@@ -169,6 +174,41 @@ def test_cycles_are_drawn_of_many_records_and_linked_where_they_are(tmp_path: Pa
     page = (tmp_path / "page/here/index.html").read_text()
     assert 'href="../../one.nc"' in page
     assert "Mean over all cycles, grey" in page
+
+
+def tracked() -> xr.Dataset:
+    """Makes motions of three parts in two pictures, which agree within 0.01 px and rad."""
+    known = np.ones((3, 2, 3))
+    motions = {"reference": known, "measured": known + np.array([0.01, 0.01, 0.001])}
+    return xr.Dataset(
+        {name: (("part", "frame", "dof"), each) for name, each in motions.items()}
+        | {"seen": ("unit", [1, 0]), "pixel_size": 0.5},
+        {"part": list("abc"), "frame": [1, 2], "dof": ["ux", "uy", "theta"]},
+    )
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_the_other_program_does_not_tell_is_no_fault_of_the_tracker() -> None:
+    asked, made = load_section(FOLDER / "pictures.yaml", KnownPictures), tracked()
+    whole, facts = error_table(made).rows, picture_facts(made, asked)
+    assert (facts["missed_parts"], facts["judged"], facts["within"]) == (0, True, True)
+    made["reference"][1, 0] = made["measured"][1, 0] = np.nan
+    assert (error_table(made).rows, picture_facts(made, asked)) == (whole, facts)
+    made["measured"][0, 1] = np.nan
+    assert picture_facts(made, asked) == {**facts, "missed_parts": 1}
+    made["reference"][2] = np.nan
+    assert error_table(made).rows[2][1:] == ["in no picture of both", "", "", ""]
+    assert picture_facts(made, asked)["within"]
+    made["measured"][0, 0, 0] += 1.0
+    assert not picture_facts(made, asked)["within"]
+
+
+def test_agreement_is_judged_by_what_the_other_program_is_good_to() -> None:
+    asked, made = load_section(FOLDER / "pictures.yaml", KnownPictures), tracked()
+    for accuracy, judged, within in (((0.005, 0.002), True, False), (None, False, True)):
+        parts = asked.rigid_parts.model_copy(update={"accuracy": accuracy})
+        facts = picture_facts(made, asked.model_copy(update={"rigid_parts": parts}))
+        assert (facts["judged"], facts["within"]) == (judged, within)
 
 
 def test_pictures_are_those_of_the_frames(tmp_path: Path) -> None:
