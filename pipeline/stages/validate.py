@@ -58,7 +58,7 @@ def _samples(args: argparse.Namespace) -> None:
     )
 
 
-def _origin(asked: Section, folder: Path, role: str, *, synthetic: bool = False) -> dict[str, str]:
+def _origin(asked: Section, folder: Path, role: str, *, synthetic: bool) -> dict[str, str]:
     """Records the provenance of what is made of a description and of all files that it names."""
     parents = named_files(asked, folder)
     return provenance.of_recording(asked.model_dump_json(), parents, synthetic=synthetic, role=role)
@@ -95,5 +95,6 @@ def _cycles(args: argparse.Namespace) -> None:
 def _pictures(args: argparse.Namespace) -> None:
     asked, folder = load_section(args.file, KnownPictures), args.file.parent
     made = study_pictures(asked, folder)
-    datasets.write(made, args.out, "pictures", _origin(asked, folder, "pictures"))
+    origin = _origin(asked, folder, "pictures", synthetic=asked.synthetic)
+    datasets.write(made, args.out, "pictures", origin)
     LOG.info("%d of %d units found", int(made["seen"].sum()), made.sizes["unit"])

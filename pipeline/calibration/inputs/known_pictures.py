@@ -89,9 +89,11 @@ class KnownPictures(Section):
         doc: more lines.
         rigid_parts: parts that another program has tracked.
         specimen: a specimen to be found unaided.
+        synthetic: whether any of the pictures was rendered, not taken.
     """
 
     title: str = ""
     doc: str = ""
     rigid_parts: RigidParts
     specimen: SpecimenPicture
+    synthetic: bool = False

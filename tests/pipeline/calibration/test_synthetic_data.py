@@ -8,7 +8,13 @@ import pytest
 from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.calibration import calibration_dataset
-from pipeline.calibration.inputs import Calibration, LoadCycles, Population, has_synthetic
+from pipeline.calibration.inputs import (
+    Calibration,
+    KnownPictures,
+    LoadCycles,
+    Population,
+    has_synthetic,
+)
 from pipeline.problem.reading import load_section
 from pipeline.runtime import ROOT
 from pipeline.stages import calibrate, validate
@@ -95,4 +101,15 @@ def test_cycles_of_computed_records_say_so(tmp_path: Path, monkeypatch: pytest.M
     out = tmp_path / "cycles.nc"
     words = ["cycles", str(HINGES.parent / "morpher.yaml"), "--out", str(out), "--quiet"]
     assert run_stage("validate", words) == 0
+    assert datasets.read_attributes(out)["synthetic"] == "yes"
+
+
+def test_rendered_pictures_are_told_as_such(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, out = HINGES.parent / "pictures.yaml", tmp_path / "pictures.nc"
+    asked = load_section(path, KnownPictures).model_copy(update={"synthetic": True})
+    monkeypatch.setattr(validate, "load_section", lambda *_: asked)
+    monkeypatch.setattr(validate, "study_pictures", lambda *_: sample("pictures"))
+    assert run_stage("validate", ["pictures", str(path), "--out", str(out), "--quiet"]) == 0
     assert datasets.read_attributes(out)["synthetic"] == "yes"
