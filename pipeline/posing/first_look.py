@@ -13,9 +13,7 @@ from pipeline.posing.perturbed import noises
 from pipeline.posing.to_scene import material_of
 from pipeline.problem import Problem
 from pipeline.problem.sections import (
-    LinearRampDrive,
     SingleDrive,
-    TanhRampDrive,
     Triangular,
     case_count,
     single_drives,
@@ -124,7 +122,6 @@ def doubts(asked: Problem, scene: Scene) -> Iterator[str]:
                 f"rows of hexagons buckle when they are pushed by {BUCKLING * size:.2g} mm or so,"
                 " which no cloak hides: pull them (`drive.directions: [0 deg]`), or push them less"
             )
-    yield from _ends(asked)
     yield from _shown(asked)
     yield from _picture(asked)
     yield from _necks(scene.lattice)
@@ -201,38 +198,13 @@ def _inward(drive: SingleDrive, scene: Scene) -> bool:
     return bool((np.cos(ways) * outward[0] + np.sin(ways) * outward[1] < -1e-6).any())
 
 
-def _reach(drive: SingleDrive, horizon: float) -> float:
-    """Computes the largest size of a drive until the horizon, in its unit."""
-    size: float = getattr(drive, "amplitude", math.inf)
-    if isinstance(drive, LinearRampDrive):
-        return size * horizon / drive.duration
-    if isinstance(drive, TanhRampDrive):
-        return size * (1 + math.tanh(6 * (2 * horizon / drive.duration - 1))) / 2
-    return size
-
-
-def _ends(asked: Problem) -> Iterator[str]:
-    """Doubts ramps that end before or after the horizon does."""
-    horizon = asked.horizon_time
-    for drive in single_drives(asked.drive):
-        if not isinstance(drive, LinearRampDrive | TanhRampDrive):
-            continue
-        if not math.isclose(reach := _reach(drive, horizon), drive.amplitude, rel_tol=1e-3):
-            yield (
-                f"the drive goes {reach:.3g} {drive.unit} for its amplitude of"
-                f" {drive.amplitude:g} {drive.unit}: its duration is {drive.duration:g} s, and the"
-                f" horizon ends at {horizon:g} s; give `drive.duration` and `horizon.duration`"
-                " alike if that is not meant"
-            )
-
-
 def _shown(asked: Problem) -> Iterator[str]:
     """Doubts what a report is to show and the response does not reach."""
     first, horizon = single_drives(asked.drive)[0], asked.horizon_time
     cycles = asked.response.cycles / asked.frequency if asked.frequency else 0.0
     name, end, unit = "instants", max(horizon, cycles), "s"
     if asked.static:
-        name, end, unit = "snapshots", _reach(first, horizon), first.unit
+        name, end, unit = "snapshots", getattr(first, "amplitude", math.inf), first.unit
     listed: tuple[float, ...] = getattr(asked.report, name)
     if beyond := [each for each in listed if each > end * (1 + 1e-6)]:
         yield (

@@ -135,6 +135,7 @@ _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     load_checks.one_kind_of_load,
     load_checks.spectrum,
     load_checks.horizon,
+    load_checks.ramps_end,
     load_checks.drive_comes,
     _robust,
     load_checks.reaction,

@@ -129,6 +129,18 @@ def horizon(problem: Problem) -> Findings:
         yield ProblemFault(what, ("horizon", "steps"), "drive by a linear_ramp, or give `samples`")
 
 
+def ramps_end(problem: Problem) -> Findings:
+    """Finds ramps of a static path that do not reach their amplitude at its very end."""
+    end = problem.horizon_time
+    for keys, drive in _drives(problem):
+        if not problem.static or not isinstance(drive, LinearRampDrive | TanhRampDrive):
+            continue
+        if not isclose(drive.duration, end):
+            what = f"the ramp lasts {drive.duration:g} s, and the load path {end:g} s"
+            remedy = "give both one duration; to load less or more, change `amplitude`"
+            yield ProblemFault(what, (*keys, "duration"), remedy)
+
+
 def drive_comes(problem: Problem) -> Findings:
     """Finds drives that come after the horizon: nothing moves until its end."""
     end = problem.horizon_time
@@ -166,7 +178,7 @@ def loads_in_ranges(problem: Problem) -> Findings:
     for index, setup in enumerate(family.setups):
         posed, keys = problem.in_setup(setup), (*place, "setups", index)
         turned = _turned(posed, setup)
-        for check in (units_exist, drive_is_free, one_kind_of_load, horizon):
+        for check in (units_exist, drive_is_free, one_kind_of_load, horizon, ramps_end):
             yield from (replace(found, keys=(*keys, *found.keys)) for found in check(turned))
         yield from _ranges(posed, setup, keys)
         if (posed.static, posed.frequency is None) != (problem.static, problem.frequency is None):

@@ -213,7 +213,7 @@ class TanhRampDrive(DisplacementDrive):
     """A (1 + tanh(6 (2 t/duration - 1)))/2, the authors' slow compression.
 
     Attributes:
-        duration: of the ramp; a static path has no time, so that it only names the loads.
+        duration: of the ramp, and of the horizon: a static path has no time, it names the loads.
     """
 
     kind: Literal["tanh_ramp"]
@@ -224,7 +224,7 @@ class LinearRampDrive(DisplacementDrive):
     """A t/duration.
 
     Attributes:
-        duration: of the ramp; a static path has no time, so that it only names the loads.
+        duration: of the ramp, and of the horizon: a static path has no time, it names the loads.
     """
 
     kind: Literal["linear_ramp"]
