@@ -250,10 +250,12 @@ def _kerf_step(settings: Fabrication) -> list[str]:
     """Writes the step on the two variants of each sheet; none if there is one."""
     if not settings.laser.kerf:
         return []
-    kerf = f"{settings.laser.kerf:g}"
+    kerf, hung = f"{settings.laser.kerf:g}", ""
+    if settings.shims.tabs is not None:
+        hung = f" Of shims, which hang on tabs, cut those _kerf{kerf} on any cutter."
     return [
         f"Cut either the drawings _nominal or those _kerf{kerf}, never both: the second ones make "
-        f"good a cut {kerf} mm wide, the first are for a cutter that does so itself."
+        f"good a cut {kerf} mm wide, the first are for a cutter that does so itself.{hung}"
     ]
 
 

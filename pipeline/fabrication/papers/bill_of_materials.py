@@ -111,7 +111,7 @@ def bill_rows(
     for file, parts in contents.items():
         note, count = _counted(len(parts), "part"), 1
         if file.startswith("laser/") and settings.laser.kerf:
-            note += f"; {_variant_words(file, settings.laser.kerf)}"
+            note += f"; {_variant_words(file, settings)}"
         if file.startswith(_LAYERED):
             note += f"; {settings.laser_route}"
             count = settings.laser_layers if settings.laminated else 1
@@ -248,9 +248,15 @@ def _way(name: str, count: int, parts: Sequence[FlatPart], *, drawn: bool) -> Bi
     return BillRow("foil", name, count, length=path, note=note)
 
 
-def _variant_words(file: str, kerf: float) -> str:
+def _variant_words(file: str, settings: Fabrication) -> str:
     """Tells which sheets a sheet may be cut in the place of."""
-    if "_nominal" in file:
+    nominal, kerf = "_nominal" in file, settings.laser.kerf
+    if file.startswith("laser/shims_") and settings.shims.tabs is not None:
+        if not nominal:
+            return "kerf made good: cut it, not the nominal sheets"
+        what = "do not cut it: its lines, from tab to tab, are open, and no cutter makes its"
+        return f"at nominal size: {what} kerf good on these; cut the sheets of kerf{kerf:g}"
+    if nominal:
         return f"at nominal size: cut it or the sheets of kerf{kerf:g}, not both"
     return "kerf made good: cut it or the nominal sheets, not both"
 

@@ -86,6 +86,9 @@ def test_neighbouring_tiles_share_a_strip_and_its_middle_line() -> None:
     assert mine[1] == pytest.approx(other[1])
 
 
+VARIANTS = ("nominal", "kerf0.15")
+
+
 @pytest.mark.parametrize("kerf", [0.15, 0.0])
 def test_papers_tell_that_sheets_of_a_kerf_replace_nominal_ones(kerf: float) -> None:
     laser = ASKED.laser.model_copy(update={"kerf": kerf})
@@ -102,6 +105,19 @@ def test_papers_tell_that_sheets_of_a_kerf_replace_nominal_ones(kerf: float) -> 
     assert notes[names[0]] == "1 part; at nominal size: cut it or the sheets of kerf0.15, not both"
     assert notes[names[1]] == "1 part; kerf made good: cut it or the nominal sheets, not both"
     assert "Cut either the drawings _nominal or those _kerf0.15" in steps
+
+
+def test_shims_on_tabs_are_never_cut_at_nominal_size() -> None:
+    """Lines from tab to tab are open: no cutter makes a kerf good on them."""
+    specimen, names = handmade.specimen(), [f"laser/shims_sheet1_{v}.dxf" for v in VARIANTS]
+    free = ASKED.model_copy(update={"shims": ASKED.shims.model_copy(update={"tabs": None})})
+    for settings, told in ((ASKED, True), (free, False)):
+        rows = bill_rows(specimen, settings, DENSITY, {name: ["S"] for name in names}, {}, 0.62)
+        nominal, compensated = (row.note for row in rows if row.item == "sheet")
+        assert ("do not cut it: its lines, from tab to tab, are open" in nominal) == told
+        assert ("kerf made good: cut it, not the nominal sheets" in compensated) == told
+        steps = " ".join(assembly_steps(specimen, settings, []))
+        assert ("Of shims, which hang on tabs, cut those _kerf0.15 on any cutter" in steps) == told
 
 
 PRINTS = {"print/plate_01.3mf": PrintEstimate(3900.0, 2000.0)}
