@@ -1,5 +1,6 @@
 from .assembly_sheet import write_assembly_sheet as write_assembly_sheet
 from .bill_of_materials import BILL as BILL
+from .bill_of_materials import DRAWN_TWICE as DRAWN_TWICE
 from .bill_of_materials import bill_rows as bill_rows
 from .bill_of_materials import read_bill as read_bill
 from .bill_of_materials import write_bill as write_bill

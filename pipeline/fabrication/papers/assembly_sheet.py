@@ -191,6 +191,7 @@ def assembly_steps(
         "The id is on the "
         "underside of a printed unit and on top of a cut one; the arrow beside it points to the "
         f"top of the plan, as does a ring at the upper end.{letters}",
+        _route_step(settings),
         *_kerf_step(settings),
         *_layers_step(specimen, settings),
         f"{_foil_words(settings)} Sort {pieces} shims and the spares by their length (next pages); "
@@ -244,6 +245,13 @@ def _foil_words(settings: Fabrication) -> str:
         f"Each shim hangs in its sheet by tabs of {tabs.width:g} mm ({tabs.count} a shim): keep "
         "the sheets whole, twist out what the next row takes, and trim what stands out of an edge."
     )
+
+
+def _route_step(settings: Fabrication) -> str:
+    """Writes the step on what is drawn for the printer and for the laser cutter."""
+    if settings.laser_cuts_units:
+        return "Print the units and the coupon, or cut them: not both. Fixtures are printed."
+    return "Print the units and the coupon: no laser cuts their slots."
 
 
 def _kerf_step(settings: Fabrication) -> list[str]:

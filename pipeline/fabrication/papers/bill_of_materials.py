@@ -35,6 +35,9 @@ _FEED, _START = 10.0, 0.5  # mm/s of a laser through foil, s until a cut begins;
 _HEADING = "item id count area_mm2 volume_mm3 mass_g length_mm width_mm height_mm files note"
 _LAYERED = ("laser/units_", "laser/coupon_")
 """Begin the names of the sheets that are cut once for each layer of a unit."""
+DRAWN_TWICE = (*_LAYERED, "print/units_", "print/coupon_")
+"""Begin the names of the files of what is drawn for the laser cutter and for the printer."""
+_EITHER = "print units and coupon or cut them, not both"
 _KINDS = {"laser": "sheet", "print": "plate", "fixture": "fixture"}  # of files, by their folder
 
 
@@ -109,15 +112,7 @@ def bill_rows(
         factors = specimen.stiffness.get(ligament.number)
         yield _ligament(ligament, kinds[ligament.number], factors)
     for file, parts in contents.items():
-        note, count = _counted(len(parts), "part"), 1
-        if file.startswith("laser/") and settings.laser.kerf:
-            note += f"; {_variant_words(file, settings)}"
-        if file.startswith(_LAYERED):
-            note += f"; {settings.laser_route}"
-            count = settings.laser_layers if settings.laminated else 1
-        if file in prints:
-            note += f"; {_print_words(prints[file], settings)}"
-        yield BillRow(_KINDS[file.partition("/")[0]], file, count, note=note)
+        yield _file(file, len(parts), settings, prints.get(file))
     if settings.laminated:
         yield _pins(specimen, settings)
     yield _dots(specimen)
@@ -165,6 +160,21 @@ def _unit(
     )
 
 
+def _file(file: str, parts: int, settings: Fabrication, printing: PrintEstimate | None) -> BillRow:
+    """Describes a sheet, a plate or a fixture; notes what it is cut or printed in the place of."""
+    note, count = _counted(parts, "part"), 1
+    if file.startswith("laser/") and settings.laser.kerf:
+        note += f"; {_variant_words(file, settings)}"
+    if file.startswith(_LAYERED):
+        note += f"; {settings.laser_route}"
+        count = settings.laser_layers if settings.laminated else 1
+    if file.startswith(DRAWN_TWICE) and settings.laser_cuts_units:
+        note += f"; {_EITHER}"
+    if printing is not None:
+        note += f"; {_print_words(printing, settings)}"
+    return BillRow(_KINDS[file.partition("/")[0]], file, count, note=note)
+
+
 def _shim(shim: Shim, settings: Fabrication, holders: Mapping[str, Sequence[str]]) -> BillRow:
     area, thickness = shim.length * shim.width, settings.shims.thickness
     return BillRow(
@@ -209,7 +219,7 @@ def _pins(specimen: BuiltSpecimen, settings: Fabrication) -> BillRow:
         if few := [label for label, pins in counts.items() if pins == count]:
             note += f"; {words}: {', '.join(few)}"
     tried = len(coupon(settings, layered=True).holes)
-    note += f"; {tried} for the coupon"
+    note += f"; {tried} for the coupon; {_EITHER}"
     pin, total = settings.laser.pin, sum(counts.values()) + tried
     return BillRow(
         "pin", f"PIN{pin:g}", total, length=settings.thickness, width=pin, height=pin, note=note

@@ -307,6 +307,11 @@ class Fabrication(Section):
         return self.laser_layers > 1 and self.laser_sheet_thickness >= _THINNEST_LAYER
 
     @property
+    def laser_cuts_units(self) -> bool:
+        """Tests that units can be cut by laser, whole or in layers, in place of printing them."""
+        return self.laser_layers == 1 or self.laminated
+
+    @property
     def laser_route(self) -> str:
         """Tells in words how units can be cut by laser, if they can."""
         layers, each = self.laser_layers, self.laser_sheet_thickness

@@ -6,16 +6,17 @@ what the file was meant to be. The same packages give the same bytes.
 
 import argparse
 import base64
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pipeline import problem
-from pipeline.fabrication.papers import read_bill, read_manifest
+from pipeline.fabrication.papers import DRAWN_TWICE, read_bill, read_manifest
 from pipeline.fabrication.parts import STRAIGHT, THIN_WALL
 from pipeline.posing import loss_units
 from pipeline.problem import Problem
+from pipeline.problem.sections import Fabrication
 from pipeline.runtime import cli
 from reports.facts import worded
 from reports.page import titled, write_page
@@ -95,7 +96,7 @@ def package(folder: Path, problem: Problem) -> dict[str, Any]:
     return {
         "name": name,
         "title": TITLES.get(name, name),
-        "facts": list(_facts(folder, told)),
+        "facts": list(_facts(folder, told, problem.fabrication)),
         "groups": list(_groups(folder, problem)),
         "foil": [
             (row["id"], row["count"], row["note"])
@@ -116,7 +117,7 @@ def parameters(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str
             yield f"{above}{key}", ", ".join(str(item) for item in listed)
 
 
-def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[PackageFact]:
+def _facts(folder: Path, told: Mapping[str, Any], settings: Fabrication) -> Iterator[PackageFact]:
     bill = read_bill(folder / "bom.csv")
     total = {row["id"]: row for row in bill if row["item"] == "total"}
     units, shims = total["units"], total["shims"]
@@ -150,18 +151,29 @@ def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[PackageFact]:
         yield PackageFact(f"{len(stiff)}", "joints that are simulated otherwise than shims", note)
     volume = float(units["volume_mm3"]) / 1000.0
     yield PackageFact(f"{volume:.0f} cm³", "volume of the units", "as if solid")
-    sheets = sum(int(r["count"]) for r in bill if r["item"] == "sheet" and "_nominal" in r["id"])
-    plates = sum(row["item"] in {"plate", "fixture"} for row in bill)
-    yield PackageFact(
-        f"{sheets} / {plates}", "sheets to cut / plates to print", "fixtures included"
-    )
+    yield _pieces(bill, settings)
     route = told["laser_route"]
     how = route.partition(": ")[0].partition(" from ")[0]
     yield PackageFact(how, "units by laser", route)
     prints = total["prints"]
     took, _, needs = prints["note"].partition(", ")
-    note = f"{needs} of filament, fixtures included; by a slicer's standard settings"
+    note = f"{needs} of filament, units and fixtures; by a slicer's standard settings"
     yield PackageFact(took.removeprefix("about "), "print time, estimated", note)
+
+
+def _pieces(bill: Sequence[Mapping[str, str]], settings: Fabrication) -> PackageFact:
+    """Counts sheets and plates by either way to make units and coupon, which are drawn for both."""
+    sheets = {
+        r["id"]: int(r["count"]) for r in bill if r["item"] == "sheet" and "_nominal" in r["id"]
+    }
+    plates = [row["id"] for row in bill if row["item"] in {"plate", "fixture"}]
+    foil = {file: count for file, count in sheets.items() if not file.startswith(DRAWN_TWICE)}
+    fixtures = sum(not file.startswith(DRAWN_TWICE) for file in plates)
+    note = "fixtures included, units and coupon printed"
+    if settings.laser_cuts_units:
+        note += f"; these cut by laser {sum(sheets.values())} / {fixtures}"
+    value = f"{sum(foil.values())} / {len(plates)}"
+    return PackageFact(value, "sheets to cut / plates to print", note)
 
 
 def _groups(folder: Path, problem: Problem) -> Iterator[tuple[str, list[Picture]]]:

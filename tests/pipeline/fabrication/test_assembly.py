@@ -48,7 +48,7 @@ def test_the_pages_name_every_unit_shim_and_fixture(tmp_path: Path) -> None:
     assert {"S8.25", "8.25 mm", "8.10 mm", "7", "1", "8"} <= set(shims)
     assert "Set the clamped units into their pads, grips or adapters: A1, C2." in " ".join(pages[0])
     steps = [words for words in pages[0] if words.rstrip(".").isdigit()]
-    assert steps[1:] == [f"{number}." for number in range(1, 14)]  # after the page's own
+    assert steps[1:] == [f"{number}." for number in range(1, 15)]  # after the page's own
 
 
 def test_two_kinds_of_shims_are_told_apart_by_ligament(tmp_path: Path) -> None:
@@ -84,6 +84,31 @@ def test_neighbouring_tiles_share_a_strip_and_its_middle_line() -> None:
     (mine,), (other,) = list(first.joints()), list(second.joints())
     assert mine[0] == other[0] == "x"
     assert mine[1] == pytest.approx(other[1])
+
+
+BOTH = (
+    "laser/units_sheet1_nominal.dxf",
+    "laser/coupon_sheet1_nominal.dxf",
+    "print/units_plate1.3mf",
+    "print/coupon_plate1.3mf",
+)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 20.0])
+def test_papers_tell_to_print_units_or_to_cut_them(ratio: float) -> None:
+    laser = ASKED.laser.model_copy(update={"aspect_ratio": ratio})
+    settings, specimen = ASKED.model_copy(update={"laser": laser}), handmade.specimen()
+    others = ("laser/comb_sheet1_nominal.dxf", "fixture/fixture_plate1.3mf")
+    contents = {name: ["A1"] for name in (*BOTH, *others)}
+    prints = {name: PRINTS["print/plate_01.3mf"] for name in contents if name.endswith("3mf")}
+    rows = bill_rows(specimen, settings, DENSITY, contents, prints, 0.62)
+    notes = {row.id: row.note for row in rows if row.item in {"sheet", "plate", "fixture", "pin"}}
+    told = [name for name, note in notes.items() if "print units and coupon or cut them" in note]
+    pins = ["PIN1.5"] * (ratio == 3.0)
+    assert told == ([] if ratio == 1.0 else [*BOTH, *pins])
+    steps = " ".join(assembly_steps(specimen, settings, []))
+    assert ("Print the units and the coupon, or cut them: not both" in steps) == (ratio > 1.0)
+    assert ("Print the units and the coupon: no laser cuts" in steps) == (ratio == 1.0)
 
 
 VARIANTS = ("nominal", "kerf0.15")
@@ -145,7 +170,10 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     assert found[5]["note"].endswith("; walls from 0.70 mm (thin)")
     (pin,) = (row for row in found if row["item"] == "pin")
     none = "no room for a pin: the jig alone aligns: A1, B1, C1, A2, B2, C2"
-    assert pin["note"] == f"aligns 6 layers; {none}; 2 for the coupon"
+    told = (
+        f"aligns 6 layers; {none}; 2 for the coupon; print units and coupon or cut them, not both"
+    )
+    assert pin["note"] == told
     assert first["files"] == "laser/units_01_nominal.dxf print/plate_01.3mf"
     area = specimen.units[0].design.area
     assert float(first["mass_g"]) == pytest.approx(area * 6.18e-3, abs=1e-4)  # kg/m^2 = mg/mm^2

@@ -142,12 +142,12 @@ def test_losses_that_are_energies_have_their_unit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("laser", "value", "note"),
+    ("laser", "value", "note", "cut"),
     [
-        ({"kerf": "0.15 mm"}, "cut 6 times", "pin and glue: slots of 0.45 mm are cut 3 times"),
-        ({"kerf": "0 mm"}, "cut 6 times", "pin and glue: slots of 0.45 mm are cut 3 times"),
-        ({"aspect_ratio": 1.0}, "print only", "which would take 18 layers"),
-        ({"aspect_ratio": 20.0}, "cut", "cut from sheet of 8.1 mm"),
+        ({"kerf": "0.15 mm"}, "cut 6 times", "slots of 0.45 mm are cut 3 times", "15 / 1"),
+        ({"kerf": "0 mm"}, "cut 6 times", "slots of 0.45 mm are cut 3 times", "15 / 1"),
+        ({"aspect_ratio": 1.0}, "print only", "which would take 18 layers", None),
+        ({"aspect_ratio": 20.0}, "cut", "cut from sheet of 8.1 mm", "5 / 1"),
     ],
 )
 def test_the_page_tells_whether_units_can_be_cut(
@@ -156,6 +156,7 @@ def test_the_page_tells_whether_units_can_be_cut(
     laser: dict[str, object],
     value: str,
     note: str,
+    cut: str | None,
 ) -> None:
     monkeypatch.setattr(fabrication_report, "_groups", lambda *_: ())  # of pictures
     asked = built.write(tmp_path / "cloaked", {"laser": laser})
@@ -166,3 +167,6 @@ def test_the_page_tells_whether_units_can_be_cut(
     fact = told["units by laser"]
     assert fact.value == value
     assert note in fact.note
+    counts = told["sheets to cut / plates to print"]
+    assert counts.value == "3 / 3"  # of units and coupon, the plates alone
+    assert counts.note.partition("cut by laser ")[2] == (cut or "")
