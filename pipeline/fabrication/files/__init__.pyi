@@ -1,1 +1,2 @@
+from .drawing_files import COLOURS as COLOURS
 from .package_folder import PackageFolder as PackageFolder

@@ -66,7 +66,7 @@ def _new_document(version: str) -> Drawing:
     document.header["$MEASUREMENT"] = 1
     document.appids.add(APPLICATION)
     for name, colour in LAYERS.items():
-        document.layers.add(name, color=colour)
+        document.layers.add(name, color=colour, plot=name != "REFERENCE")  # told by R2010 alone
     return document
 
 

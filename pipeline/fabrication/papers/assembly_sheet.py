@@ -193,6 +193,9 @@ def assembly_steps(
         f"top of the plan, as does a ring at the upper end.{letters}",
         _route_step(settings),
         *_kerf_step(settings),
+        "Lines of the drawings in laser/, in this order: green engraves, red scores, blue cuts "
+        "holes, then black cuts out (white on a dark screen). Grey, on the layer REFERENCE, is the "
+        "rim of the sheet: switch grey off.",
         *_layers_step(specimen, settings),
         f"{_foil_words(settings)} Sort {pieces} shims and the spares by their length (next pages); "
         "on the sheet the first of each length tells it in mm and is a spare. Numbers and colours "

@@ -12,21 +12,16 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
+from pipeline.fabrication.files import COLOURS
 from pipeline.fabrication.readback import Curve, MeshBody, read_3mf, read_drawing, read_stl
-from reports.base import GREY, INTACT, MM_PER_INCH, PALE, style
+from reports.base import GREY, MM_PER_INCH, PALE, style
 from reports.products.fabrication.renderer import Body, picture
 
 WIDTH = 1000
 """Of a picture in pixels."""
 
-PENS = {
-    "REFERENCE": GREY,
-    "SCORE": "#c25e00",
-    "ENGRAVE": "#1d7f78",
-    "CUT_INNER": "#17427f",
-    "CUT_OUTER": INTACT,
-}
-"""Colours in which the layers are shown here, in the order of drawing."""
+PENS = COLOURS
+"""Colours of the layers, those of the files, in the order of drawing."""
 
 _RIM = 6.0  # mm around a sheet
 _BED = "#e6e8ea"

@@ -48,7 +48,7 @@ def test_the_pages_name_every_unit_shim_and_fixture(tmp_path: Path) -> None:
     assert {"S8.25", "8.25 mm", "8.10 mm", "7", "1", "8"} <= set(shims)
     assert "Set the clamped units into their pads, grips or adapters: A1, C2." in " ".join(pages[0])
     steps = [words for words in pages[0] if words.rstrip(".").isdigit()]
-    assert steps[1:] == [f"{number}." for number in range(1, 15)]  # after the page's own
+    assert steps[1:] == [f"{number}." for number in range(1, 16)]  # after the page's own
 
 
 def test_two_kinds_of_shims_are_told_apart_by_ligament(tmp_path: Path) -> None:
@@ -84,6 +84,16 @@ def test_neighbouring_tiles_share_a_strip_and_its_middle_line() -> None:
     (mine,), (other,) = list(first.joints()), list(second.joints())
     assert mine[0] == other[0] == "x"
     assert mine[1] == pytest.approx(other[1])
+
+
+def test_steps_tell_what_the_lines_of_a_drawing_are() -> None:
+    (step,) = (s for s in assembly_steps(handmade.specimen(), ASKED, []) if "laser/" in s)
+    for words in (
+        "green engraves, red scores, blue cuts holes, then black cuts out",
+        "switch grey off",
+        "layer REFERENCE",
+    ):
+        assert words in step
 
 
 BOTH = (

@@ -94,6 +94,15 @@ def test_the_page_shows_every_sheet_and_plate_and_tells_the_bill(package: Path, 
         assert words in page
 
 
+def test_the_legend_has_the_colours_of_the_files(package: Path, page: str) -> None:
+    drawn = "".join(path.read_text() for path in package.glob("laser/*_nominal.svg"))
+    shown = re.findall(r'<i style="color: (#\w+)"></i>(\w+)</span>', page)
+    assert len(shown) == 5
+    for colour, layer in shown:
+        (found,) = set(re.findall(rf'<g id="{layer}"[^>]* stroke="(#\w+)"', drawn))
+        assert found == colour
+
+
 def test_the_same_package_gives_the_same_page(package: Path, page: str, tmp_path: Path) -> None:
     assert page_of(tmp_path / "again.html", package) == page
 
