@@ -63,11 +63,11 @@ class PackageFolder:
     def _flat_parts(self) -> Iterator[tuple[str, Sequence[FlatPart]]]:
         """Yields kinds of sheets with their parts; a kind is cut from one material."""
         specimen, settings = self.specimen, self.problem.fabrication
-        spacing, gap = self.problem.lattice.spacing, self.problem.lattice.ligament_length
+        spacing = self.problem.lattice.spacing
         yield "units", [unit.part for unit in specimen.units]
         yield "shims", shim_pieces(specimen, settings)
         yield "template", list(templates(specimen, spacing, settings))
-        yield "comb", [comb(specimen, spacing, gap, settings)]
+        yield "comb", [comb(specimen, spacing, settings)]
         yield "coupon", [coupon(settings, layered=settings.laminated)]
 
     def _write_print(self) -> None:

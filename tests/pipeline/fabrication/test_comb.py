@@ -10,17 +10,17 @@ from pipeline.fabrication.parts import BuiltSpecimen
 from sim.core import Floats
 from tests.pipeline.fabrication import handmade
 
-GAP = 2.25
+
+def tips(specimen: BuiltSpecimen) -> Floats:
+    """Lists where the tips of the teeth begin and end (n, 2), mm."""
+    drawn = comb(specimen, handmade.SPACING, handmade.ASKED)
+    points = np.asarray(drawn.outline.exterior.coords)
+    return np.unique(points[points[:, 1] == points[:, 1].max(), 0]).reshape(-1, 2)
 
 
 def teeth(specimen: BuiltSpecimen) -> Floats:
-    """Middles (n,) of the teeth, mm."""
-    points = np.asarray(
-        comb(specimen, handmade.SPACING, GAP, handmade.ASKED).outline.exterior.coords
-    )
-    tips = np.unique(points[points[:, 1] == points[:, 1].max(), 0])
-    assert np.diff(tips)[::2] == pytest.approx(GAP)
-    return (tips[::2] + tips[1::2]) / 2
+    """Lists the middles (n,) of the teeth, mm."""
+    return tips(specimen).mean(axis=1)
 
 
 def changed(scale: float, turn: float) -> BuiltSpecimen:
@@ -35,6 +35,14 @@ def changed(scale: float, turn: float) -> BuiltSpecimen:
         replace(each, middle=(scale * each.middle[0], each.middle[1])) for each in one.ligaments
     )
     return replace(one, units=units, ligaments=ligaments)
+
+
+def test_teeth_fill_the_gaps_between_units_as_they_are_cut() -> None:
+    """Units are cut back beside slots: the gap is wider than the ligament as designed."""
+    one = handmade.specimen()
+    gap = one.by_label["A1"].outline.distance(one.by_label["B1"].outline)
+    assert gap > one.by_label["A1"].design.distance(one.by_label["B1"].design) + 0.1
+    assert np.diff(tips(one))[:, 0] == pytest.approx(gap, abs=0.005)
 
 
 @pytest.mark.parametrize("pitch", [15.0, 11.0, 7.5])

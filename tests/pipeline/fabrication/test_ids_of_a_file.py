@@ -55,5 +55,5 @@ def test_papers_leave_columns_and_rows_out(listed: BuiltSpecimen, tmp_path: Path
 
 
 def test_the_comb_has_one_tooth_where_there_are_no_rows(listed: BuiltSpecimen) -> None:
-    assert comb(listed, handmade.SPACING, 2.25, ASKED).size[0] == handmade.SPACING
-    assert comb(handmade.specimen(), handmade.SPACING, 2.25, ASKED).size[0] > handmade.SPACING
+    assert comb(listed, handmade.SPACING, ASKED).size[0] == handmade.SPACING
+    assert comb(handmade.specimen(), handmade.SPACING, ASKED).size[0] > handmade.SPACING
