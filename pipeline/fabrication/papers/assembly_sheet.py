@@ -208,8 +208,8 @@ def assembly_steps(
         f"Push the shims in from above{pushed}, until they stand level with the units. Each "
         f"must reach the inner end of both slots within {SHIM_PLAY:g} mm.",
         *_bent_step(specimen),
-        "Check the gaps with the comb, whose teeth are as wide as most of them, then glue (if at all) "
-        "from the underside only.",
+        "Check the gaps with the comb, whose teeth are as wide as most of them, then glue (if at "
+        "all) from the underside only.",
     ]
     if specimen.clamped:
         clamped = ", ".join(specimen.clamped)
