@@ -10,6 +10,7 @@ from pipeline.problem.fields import csv_columns
 from pipeline.runtime import UNREADABLE, UserError, check_size
 
 if TYPE_CHECKING:
+    from ezdxf.entities.dxfgfx import DXFGraphic
     from ezdxf.entities.lwpolyline import LWPolyline
     from ezdxf.entities.polyline import Polyline
     from ezdxf.math import Vec3
@@ -26,6 +27,15 @@ Stiffness: TypeAlias = tuple[float | None, float | None, float | None]
 
 LARGEST_FILE = 64 << 20  # bytes
 _SMALLER = "give a smaller lattice, or the same one in a file of another kind"
+
+_NOTES = frozenset(
+    (
+        *("TEXT", "MTEXT", "ATTDEF", "LEADER", "MLEADER", "MULTILEADER", "TOLERANCE"),
+        *("DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION"),
+        *("POINT", "XLINE", "RAY", "VIEWPORT"),
+    )
+)
+"""Entities of a drawing that are about its shapes, and are left aside."""
 
 
 class NetworkContent(NamedTuple):
@@ -150,7 +160,8 @@ def _of_dxf(path: Path) -> NetworkContent:
     Whatever their layers.
 
     Raises:
-        UserError: unreadable, an outline with arcs, a longer line that is open, or a block.
+        UserError: unreadable, an outline with arcs, a longer line that is open, a block, or what is
+            neither a polyline nor a line.
     """
     from ezdxf import recover
     from ezdxf.entities.insert import Insert
@@ -173,7 +184,7 @@ def _of_dxf(path: Path) -> NetworkContent:
     space = drawing.modelspace()
     polygons: list[tuple[Point, ...]] = []
     ligaments: list[tuple[Point, Point]] = []
-    for drawn in space.query("LINE LWPOLYLINE POLYLINE INSERT"):
+    for drawn in space:
         if isinstance(drawn, Line):
             ligaments.append((_scaled(drawn.dxf.start, scale), _scaled(drawn.dxf.end, scale)))
         elif isinstance(drawn, Insert):
@@ -182,6 +193,9 @@ def _of_dxf(path: Path) -> NetworkContent:
             raise UserError(what, remedy="explode it to the polylines and lines that it shows")
         elif isinstance(drawn, LWPolyline | Polyline):
             _sort_in(drawn, scale, polygons, ligaments)
+        elif drawn.dxftype() not in _NOTES:
+            what = f"the {drawn.dxftype().lower()}{_place(drawn, scale)} is not read"
+            raise UserError(what, remedy="draw it by polylines and lines, or delete it")
     return NetworkContent(tuple(polygons), tuple(ligaments))
 
 
@@ -198,8 +212,8 @@ def _sort_in(
     """
     from ezdxf.entities.lwpolyline import LWPolyline
 
-    places = line.vertices() if isinstance(line, LWPolyline) else line.points()
-    corners = tuple(_point((scale * place[0], scale * place[1])) for place in places)
+    places = line.vertices_in_wcs() if isinstance(line, LWPolyline) else line.points_in_wcs()
+    corners = tuple(_scaled(place, scale) for place in places)
     if not corners:
         return
     x, y = corners[0]
@@ -214,6 +228,17 @@ def _sort_in(
     else:
         what = f"the open line from ({x:g}, {y:g}) mm on is neither a unit nor a ligament"
         raise UserError(what, remedy="close it, or draw each ligament by its two ends alone")
+
+
+def _place(drawn: DXFGraphic, scale: float) -> str:
+    """Tells where an entity of a drawing is, if that is known."""
+    from ezdxf.bbox import extents
+
+    box = extents([drawn], fast=True)
+    if not box.has_data:
+        return ""
+    x, y = _scaled(box.center, scale)
+    return f" about ({x:g}, {y:g}) mm"
 
 
 def _scaled(place: Vec3, scale: float) -> Point:

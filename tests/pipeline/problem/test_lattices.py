@@ -128,6 +128,44 @@ def test_ligaments_of_a_drawing_may_be_polylines(tmp_path: Path) -> None:
     assert load(from_file(tmp_path, "x.dxf")).lattice == listed
 
 
+@pytest.mark.parametrize("kind", ["add_lwpolyline", "add_polyline2d"])
+def test_mirrored_outlines_are_read_where_they_are_seen(tmp_path: Path, kind: str) -> None:
+    """CAD programs mirror by turning the axes of an outline over, with its points at -x."""
+    as_dxf(path := tmp_path / "x.dxf", SQUARES)
+    listed = load(from_file(tmp_path, "x.dxf")).lattice
+    drawing = readfile(path)
+    space = drawing.modelspace()
+    for line in list(space.query("LWPOLYLINE")):
+        corners = [(-x, y) for x, y in line.vertices()]
+        add, turned = getattr(space, kind), {"extrusion": (0.0, 0.0, -1.0)}
+        add(corners, close=line.is_closed, dxfattribs=turned)
+        space.delete_entity(line)
+    drawing.saveas(path)
+    assert load(from_file(tmp_path, "x.dxf")).lattice == listed
+
+
+DRAWN = {
+    "circle": lambda space: space.add_circle((1.0, 2.0), 1.0),
+    "spline": lambda space: space.add_spline([(0.0, 1.0), (1.0, 2.0), (2.0, 3.0)]),
+    "hatch": lambda space: space.add_hatch().paths.add_polyline_path([(0, 1), (2, 1), (1, 3)]),
+    "solid": lambda space: space.add_solid([(0, 1), (2, 1), (0, 3), (2, 3)]),
+}
+
+
+@pytest.mark.parametrize("kind", DRAWN)
+def test_what_is_neither_polyline_nor_line_is_told(tmp_path: Path, kind: str) -> None:
+    as_dxf(path := tmp_path / "x.dxf", SQUARES)
+    drawing = readfile(path)
+    drawing.modelspace().add_text("units").set_placement((0.0, 0.0))
+    drawing.modelspace().add_linear_dim((0.0, 2.0), (0.0, 0.0), (3.0, 0.0)).render()
+    drawing.saveas(path)
+    load(from_file(tmp_path, "x.dxf"))
+    DRAWN[kind](drawing.modelspace())
+    drawing.saveas(path)
+    with refused(f"the {kind} about (10, 20) mm is not read", "lattice.file", "or delete it"):
+        load(from_file(tmp_path, "x.dxf"))
+
+
 def test_what_a_drawing_would_lose_is_told(tmp_path: Path) -> None:
     as_dxf(path := tmp_path / "x.dxf", SQUARES)
     drawing = readfile(path)
