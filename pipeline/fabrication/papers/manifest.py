@@ -76,7 +76,7 @@ def write_manifest(
         "design_sha256": file_hash(design),
         "problem_hash": section_hash(problem, "fabricate"),
         "parameters": problem.fabrication.model_dump(mode="json"),
-        "parameters_note": "lengths in mm; spares is a ratio",
+        "parameters_note": "lengths in mm; spares is a share",
         "units": [unit.label for unit in specimen.units],
         "letters_for_ids": specimen.letters,
         "shims": {shim.id: shim.count for shim in specimen.shims},

@@ -85,6 +85,15 @@ def _robust(problem: Problem) -> Findings:
         yield ProblemFault(what, ("objective", "robust", "loads"), remedy)
 
 
+def _straight_shims(problem: Problem) -> Findings:
+    way = problem.fabrication.slots.direction
+    if problem.constraints.straight_shims and way != "ligament":
+        line = {"centroid": "to the centroid", "bisector": "along the bisector"}[way]
+        what = f"constraints.straight_shims makes room along ligaments, and slots are drawn {line}"
+        place = ("fabrication", "slots", "direction")
+        yield ProblemFault(what, place, "leave it at ligament, or leave straight_shims out")
+
+
 def _start_is_feasible(problem: Problem) -> Findings:
     lattice, limits = problem.lattice, problem.constraints
     if not isinstance(lattice, Regular):
@@ -144,6 +153,7 @@ _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     region_checks.inclusion,
     region_checks.target,
     region_checks.regions,
+    _straight_shims,
     _start_is_feasible,
     _symmetry,
     _optimiser,

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.problem.fields import Gap, Length, Modulus, Positive, Ratio, Section, fault
+from pipeline.problem.fields import Gap, Length, Modulus, Positive, Section, Share, fault
 from sim.structure import SlotRoom
 
 DENSITIES = {
@@ -85,15 +85,15 @@ class Shims(Section):
         thickness: of the foil.
         young_modulus: of the foil, for its moment before any load; that of polyester.
         prebend_strain: largest strain of a shim before any load; beyond it nothing is drawn.
-        spares: extra pieces of each length, as a ratio; at least one.
+        spares: extra pieces of each length, as a share; at least one.
         tabs: that hold the pieces in their sheet; null cuts each piece free.
         strips: one strip for each row and each column instead; refused, as slots end inside units.
     """
 
     thickness: Length = 0.25
     young_modulus: Modulus = 4500.0
-    prebend_strain: Ratio = 0.3
-    spares: Ratio = 0.1
+    prebend_strain: Share = 0.3
+    spares: Share = 0.1
     tabs: Tabs | None = Tabs()
     strips: bool = False
 

@@ -49,6 +49,16 @@ class Robust(Section):
     copy_sharpness: Annotated[float, Field(ge=1.0, le=64.0)] = 1.0
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
+    @model_validator(mode="after")
+    def _of_copies(self) -> Self:
+        """Refuses what copies are like where neither many nor none (`copies: 0`) are asked for."""
+        given = self.model_fields_set
+        for name in ("geometry", "stiffness", "copy_sharpness", "seed"):
+            if name in given and "copies" not in given:
+                what = "it is of imperfect copies, and none are asked for"
+                raise fault(what, "give `copies` too, such as 4, or leave it out", name)
+        return self
+
 
 class _Ranges(Section):
     """Ranges of loads, each from its least to its greatest value.
