@@ -100,6 +100,12 @@ class Lattice:
 
         That is negative, as units may overlap, but where the void is a wide one.
         """
+        wide = self.resting_voids >= VOID_BRANCH + 2 * np.pi
+        return np.where(wide, WIDE_VOID_BRANCH, VOID_BRANCH)
+
+    @cached_property
+    def resting_voids(self) -> Floats:
+        """Gives the void angles (n_ligaments, 2) beside each ligament before any load, rad."""
         ahead = self.vertices[self.next_vertex] - self.vertices
         behind = self.vertices[self.previous_vertex] - self.vertices
         first, second = self.ligaments.T
@@ -115,7 +121,7 @@ class Lattice:
         # the voids and the corners go once round a ligament, or the smaller void is a turn short
         short = np.rint((voids + corners).sum(axis=1) / (2 * np.pi)) < 1
         voids[short, voids[short].argmin(axis=1)] += 2 * np.pi
-        return np.where(voids >= VOID_BRANCH + 2 * np.pi, WIDE_VOID_BRANCH, VOID_BRANCH)
+        return voids
 
     def positions(self, ids: Ints) -> Ints:
         """Finds the positions of units with the given ids in the arrays over units.

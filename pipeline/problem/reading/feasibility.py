@@ -8,6 +8,7 @@ from pipeline.problem.reading import load_checks, region_checks
 from pipeline.problem.reading.fault import Findings, ProblemFault
 from pipeline.problem.sections import (
     HarmonicDrive,
+    Lattice,
     ListedNetwork,
     Quads,
     RampHarmonicDrive,
@@ -43,9 +44,16 @@ def _contact(problem: Problem) -> Findings:
     if barrier >= cutoff:
         what = f"the barrier ({barrier:g} deg) is not below the cut-off ({cutoff:g} deg)"
         yield ProblemFault(what, ("contact", "barrier_angle"), f"keep it below {cutoff:g} deg")
-    elif isinstance(problem.lattice, Regular) and cutoff >= (void := problem.lattice.void_angle):
+    elif cutoff >= (void := _least_void(problem.lattice)):
         what = f"the undeformed lattice is in contact: its void angles start at {void:g} deg"
         yield ProblemFault(what, ("contact", "cutoff_angle"), f"keep it below {void:g} deg")
+
+
+def _least_void(lattice: Lattice) -> float:
+    """Finds the smallest void angle of a lattice at rest, deg."""
+    if isinstance(lattice, Regular):
+        return lattice.void_angle
+    return math.degrees(lattice.network().resting_voids.min(initial=math.inf))
 
 
 def _contact_distance(problem: Problem) -> Findings:

@@ -14,7 +14,7 @@ from pipeline.posing import scene_of
 from pipeline.problem.outlines.network_files import COLUMNS
 from pipeline.problem.reading import load
 from pipeline.problem.sections import selected_units
-from sim.structure import Lattice, quads
+from sim.structure import Lattice, quads, void_angles
 from tests.pipeline.static import HOLE, MIMIC, designed, write
 from tests.tables import cases, refused
 
@@ -215,6 +215,21 @@ def test_a_kagome_lattice_from_problem_to_response(tmp_path: Path) -> None:
     assert intact == 0.0
     assert cloaked < 0.9 * altered
     assert (moved["overlaps"] == 0).all()
+
+
+@pytest.mark.parametrize("kind", ["listed", "kagome"])
+def test_no_void_of_a_lattice_is_in_contact_before_any_load(tmp_path: Path, kind: str) -> None:
+    as_csv(tmp_path / "x.csv", SQUARES)
+    path = from_file(tmp_path, "x.csv") if kind == "listed" else kagome(tmp_path, 5, 8, 28)
+    net = load(path).lattice.network()
+    least = float(np.degrees(np.asarray(void_angles(net, net.vertices)).min()))
+    text = path.read_text()
+    for cutoff in (least - 1.0, least + 1.0):
+        path.write_text(text.replace("cutoff_angle: -10 deg", f"cutoff_angle: {cutoff:g} deg"))
+        if cutoff < least:
+            load(path)
+    with refused(f"its void angles start at {least:g} deg", "contact.cutoff_angle", "below"):
+        load(path)
 
 
 def test_the_authors_kagome_lattice(tmp_path: Path) -> None:
