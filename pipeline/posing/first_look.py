@@ -122,6 +122,7 @@ def doubts(asked: Problem, scene: Scene) -> Iterator[str]:
                 f"rows of hexagons buckle when they are pushed by {BUCKLING * size:.2g} mm or so,"
                 " which no cloak hides: pull them (`drive.directions: [0 deg]`), or push them less"
             )
+    yield from _idle(asked)
     yield from _shown(asked)
     yield from _picture(asked)
     yield from _necks(scene.lattice)
@@ -196,6 +197,22 @@ def _inward(drive: SingleDrive, scene: Scene) -> bool:
     outward = sites[driven].mean(axis=0) - sites.mean(axis=0)
     ways = np.array(getattr(drive, "directions", ()))
     return bool((np.cos(ways) * outward[0] + np.sin(ways) * outward[1] < -1e-6).any())
+
+
+def _idle(asked: Problem) -> Iterator[str]:
+    """Doubts keys of other values than by default, which nothing in the problem takes up."""
+    moving, avoiding = not asked.static, asked.objective.snap == "avoid"
+    keys = (
+        (asked.solver, "solver.integrator", moving, "motions in time"),
+        (asked.response, "response.cycles", asked.frequency is not None, "drives with a frequency"),
+        (asked.report, "report.instants", moving, "motions in time"),
+        (asked.report, "report.snapshots", not moving, "static paths"),
+        (asked.objective, "objective.snap_margin", avoiding, "`objective.snap: avoid`"),
+    )
+    for section, key, used, what in keys:
+        name = key.rpartition(".")[2]
+        if not used and getattr(section, name) != type(section).model_fields[name].default:
+            yield f"`{key}` does nothing: it is for {what} alone; leave it out"
 
 
 def _shown(asked: Problem) -> Iterator[str]:

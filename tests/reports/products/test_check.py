@@ -96,6 +96,25 @@ def test_pictures_beyond_the_load_are_doubted(
     assert told is None or told in found[0]
 
 
+@pytest.mark.parametrize(
+    ("section", "key", "value"),
+    [
+        ("solver", "integrator", "explicit"),
+        ("response", "cycles", 2.0),
+        ("report", "instants", (0.5,)),
+        ("objective", "snap_margin", 0.2),
+    ],
+)
+def test_keys_that_nothing_takes_up_are_doubted(
+    section: str, key: str, value: object, tmp_path: Path
+) -> None:
+    asked = load(static.write(tmp_path, static.HOLE, size=5, amplitude=3.0))
+    changed = getattr(asked, section).model_copy(update={key: value})
+    idle = asked.model_copy(update={section: changed})
+    (told,) = doubts(idle, scene_of(asked, tmp_path))
+    assert told.startswith(f"`{section}.{key}` does nothing")
+
+
 def test_descents_and_imperfect_copies_take_time(tmp_path: Path) -> None:
     path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
     more = "law: geometric", "optimiser: { angle: { evaluations: 3 }, descents: 2,"
