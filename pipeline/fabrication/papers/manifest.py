@@ -12,7 +12,7 @@ from pipeline.problem import Problem, section_hash
 from pipeline.runtime import UserError
 
 MANIFEST = "manifest.json"
-_AGAIN = "make the package again: python -m pipeline fabricate, or snakemake --forcerun fabricate"
+_AGAIN = "make the package again: python -m pipeline run STUDY_fabrication --forcerun fabricate"
 _READ = (
     "units",
     "letters_for_ids",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _LARGEST = 512 << 20
 _UNIT = re.compile(r"[\[(][^\])]+[\])]")
 _NUMBERS = re.compile(r"[\s\";]*[-+.]?\d")
-_GAP = re.compile(r"(?:[-+]?nan(?:\(.*\))?|#?n/?a)?", re.IGNORECASE)
+_GAP = re.compile(r"(?:[-+]?nan(?:\(.*\))?|#?n/?a|-+|null|none|[-+]?1[.,]#\w+)?", re.IGNORECASE)
 """Cells of what was not measured, as programs write them."""
 _HEADING = re.compile(
     r"(?P<name>.*?)\s*(?:(?P<bracket>[\[(])|(?<=\s)/\s+)(?P<unit>[^\])]+)(?(bracket)[\])])"
@@ -95,9 +95,10 @@ def read_columns(
 ) -> Floats:
     """Reads the named columns (lines, names); lines with gaps, empty or NaN, are left out.
 
-    Lines above the heading are comments, as are those of words alone below it. Where the dimensions
-    of columns are given, and the heading (as `NAME (UNIT)`, `NAME / UNIT` or `NAME_UNIT`) or the
-    line below it has units, numbers are converted to working units; else they are in these.
+    Lines above the heading are comments, as are those below it that begin with a word or `#`.
+    Where the dimensions of columns are given, and the heading (as `NAME (UNIT)`, `NAME / UNIT` or
+    `NAME_UNIT`) or the line below it has units, numbers are converted to working units; else they
+    are in these.
 
     Raises:
         UserError: no such file, no such column, a unit of another dimension, no numbers in them, or
@@ -170,9 +171,14 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
 def _unread(
     cells: CsvCells, row: list[str], columns: list[tuple[str, int]]
 ) -> tuple[str, str] | None:
-    """Finds a column whose cell holds neither number nor gap, and that cell; none among words."""
+    """Finds a column whose cell holds neither number nor gap, and that cell.
+
+    None is found in comments and in lines that begin with a word.
+    """
     texts = [(name, at, cells.text(row, at)) for name, at in columns]
-    if not any(_NUMBERS.match(text) for *_, text in texts):
+    if not any(_NUMBERS.match(text) for *_, text in texts) or row[0].startswith("#"):
+        return None
+    if texts[0][2][:1].isalpha():  # of a line at the end, such as `Maximum;1020,7`
         return None
     unread = (
         (name, text)

@@ -32,10 +32,11 @@ _NOTES = frozenset(
     (
         *("TEXT", "MTEXT", "ATTDEF", "LEADER", "MLEADER", "MULTILEADER", "TOLERANCE"),
         *("DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION"),
-        *("POINT", "XLINE", "RAY", "VIEWPORT"),
+        *("POINT", "XLINE", "RAY", "VIEWPORT", "ACAD_TABLE", "HATCH", "MPOLYGON"),
+        *("IMAGE", "WIPEOUT", "PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY", "OLE2FRAME"),
     )
 )
-"""Entities of a drawing that are about its shapes, and are left aside."""
+"""Entities of a drawing that lie about, on or below its shapes, and are left aside."""
 
 
 class NetworkContent(NamedTuple):

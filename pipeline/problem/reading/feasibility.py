@@ -53,7 +53,7 @@ def _least_void(lattice: Lattice) -> float:
     """Finds the smallest void angle of a lattice at rest, deg."""
     if isinstance(lattice, Regular):
         return lattice.void_angle
-    return math.degrees(lattice.network().resting_voids.min(initial=math.inf))
+    return lattice.least_void
 
 
 def _contact_distance(problem: Problem) -> Findings:

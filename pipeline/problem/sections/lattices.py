@@ -182,6 +182,11 @@ class _WithNetwork(Section):
         return iter([(one, other) for one, other in _network(self).ligament_units.tolist()])
 
     @property
+    def least_void(self) -> float:
+        """Finds the smallest void angle at rest, in deg; infinite where there is no ligament."""
+        return math.degrees(_network(self).resting_voids.min(initial=math.inf))
+
+    @property
     def centre_site(self) -> Point:
         """Returns the middle of the box around the sites, in mm."""
         _, x, y = zip(*self.sites(), strict=True)

@@ -74,8 +74,9 @@ def video_of(path: Path) -> Path:
     for suffix in VIDEOS:
         if video := next((one for one in beside if one.suffix.lower() == suffix), None):
             return video
-    if (folder := path.with_suffix("")).is_dir() and has_pictures(folder):
-        return folder
+    bare = path.with_suffix("")
+    if bare.is_file() or (bare.is_dir() and has_pictures(bare)):
+        return bare
     raise UserError("no video beside it", file=path, remedy="name it with --video")
 
 

@@ -147,7 +147,6 @@ def test_mirrored_outlines_are_read_where_they_are_seen(tmp_path: Path, kind: st
 DRAWN = {
     "circle": lambda space: space.add_circle((1.0, 2.0), 1.0),
     "spline": lambda space: space.add_spline([(0.0, 1.0), (1.0, 2.0), (2.0, 3.0)]),
-    "hatch": lambda space: space.add_hatch().paths.add_polyline_path([(0, 1), (2, 1), (1, 3)]),
     "solid": lambda space: space.add_solid([(0, 1), (2, 1), (0, 3), (2, 3)]),
 }
 
@@ -158,6 +157,7 @@ def test_what_is_neither_polyline_nor_line_is_told(tmp_path: Path, kind: str) ->
     drawing = readfile(path)
     drawing.modelspace().add_text("units").set_placement((0.0, 0.0))
     drawing.modelspace().add_linear_dim((0.0, 2.0), (0.0, 0.0), (3.0, 0.0)).render()
+    drawing.modelspace().add_hatch().paths.add_polyline_path([(0, 1), (2, 1), (1, 3)])
     drawing.saveas(path)
     load(from_file(tmp_path, "x.dxf"))
     DRAWN[kind](drawing.modelspace())

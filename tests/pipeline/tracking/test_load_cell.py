@@ -108,8 +108,9 @@ def test_a_force_that_is_no_number_is_refused(tmp_path: Path, cell: str) -> None
     assert (caught.value.line, caught.value.value) == (3, cell)
 
 
-@pytest.mark.parametrize("gap", ["", "NaN", "-nan(ind)", "#N/A", "n/a"])
+@pytest.mark.parametrize("gap", ["", "NaN", "-nan(ind)", "#N/A", "n/a", "-", "null", "1.#QNAN"])
 def test_what_was_not_measured_is_a_gap(tmp_path: Path, gap: str) -> None:
-    text = f"t;F\nClock;Cell\n0,0;1,5\n0,1;{gap}\n0,2\n\n0,3;2,5\nEnd of test;\n"
+    text = f"t;F\nClock;Cell\n0,0;1,5\n0,1;{gap}\n0,2\n\n0,3;2,5\n"
+    text += "# zeroed; 5\nMean;2,0\nEnd of test;\n"
     cell = LoadCellLog(file="load.csv", time="t", force="F")
     np.testing.assert_array_equal(load_cell.read(log(tmp_path, text), cell).force, [1.5, 2.5])

@@ -222,7 +222,7 @@ def test_what_a_command_lacks_is_told(words: list[str], told: str, failing: Fail
     assert told in failing("track", words)
 
 
-@pytest.mark.parametrize("name", ["IMG.MOV", "IMG.MP4", "IMG.cine", "IMG.webm"])
+@pytest.mark.parametrize("name", ["IMG.MOV", "IMG.MP4", "IMG.cine", "IMG.webm", "IMG"])
 def test_a_video_beside_its_description_is_found_whatever_its_kind(
     tmp_path: Path, name: str
 ) -> None:
