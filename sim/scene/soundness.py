@@ -12,7 +12,7 @@ import shapely
 from sim.core import Floats, Ints, SimulationError
 from sim.scene.expected_cost import count_unknowns, estimate_cost
 from sim.scene.scene import DOFS, Scene, displaced
-from sim.solvers import DISPLACEMENT, FREE, PrescribedMotion, TimeSeries, single_motions
+from sim.solvers import DISPLACEMENT, FORCE, FREE, PrescribedMotion, TimeSeries, single_motions
 from sim.structure import Lattice, polygons
 
 LOG = logging.getLogger(__name__)
@@ -22,7 +22,7 @@ SHORTEST_LIGAMENT = 1e-6
 ROUNDING = 1e-5
 """Over the spacing, by which a ligament may differ between given vertices and the lattice."""
 JUMP, SOME_JUMP = 0.05, 0.01
-"""Of a motion at its start, over its largest displacement: refused, and warned of."""
+"""Of a motion or force at its start, over its largest value: refused, and warned of."""
 ACROSS = 1e-9
 """Part of a motion, over its largest, up to which it is across a direction but for rounding."""
 INSTANTS = 513
@@ -189,6 +189,7 @@ def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iter
     with jax.ensure_compile_time_eval():  # under jax.jit, which is refused further on
         course = np.asarray(drive.motion(instants)).reshape(INSTANTS, -1, 3)
     _clamped(scene, drive, course, case)
+    whole = course
     if drive.control is not None:
         course = np.where(drive.control == DISPLACEMENT, course, 0.0)
     far = float(np.hypot(course[..., 0], course[..., 1]).max(initial=0.0))
@@ -206,13 +207,29 @@ def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iter
         if len(drive.loaded) > 0:
             _supported(scene, case)
         return
-    whole = np.abs(course * [1.0, 1.0, scene.lattice.spacing / 2]).max(axis=(1, 2))
-    jump = whole[0] / max(whole.max(), 1e-300)
-    said = f"{case} starts with a jump, of {jump:.2g} of its largest displacement"
-    if jump > JUMP:
-        raise SceneError(f"{said}; let it start from rest", "drive")
-    if jump > SOME_JUMP:
-        yield said
+    yield from _jumps(scene, drive, whole, case)
+
+
+def _jumps(scene: Scene, drive: PrescribedMotion, course: Floats, case: str) -> Iterator[str]:
+    """Refuses displacements, or forces, that do not start at zero; warns of small ones.
+
+    The course (n_times, n_driven, 3) has both; either is measured by its own largest value.
+    """
+    size, arm = np.abs(course).max(axis=0), scene.lattice.spacing / 2
+    sizes = np.abs(np.where(size > ACROSS * size.max(initial=0.0), course, 0.0))
+    control = DISPLACEMENT if drive.control is None else drive.control
+    measured = any(isinstance(one, TimeSeries) for one in single_motions(drive.motion))
+    way, key = ("by a delay of three widths or rise times or more", "drive.delay")
+    if measured:
+        way, key = ("from zero in all columns", "drive.file")
+    for kind, what, turned in ((DISPLACEMENT, "displacement", arm), (FORCE, "force", 1.0 / arm)):
+        whole = np.where(control == kind, sizes * [1.0, 1.0, turned], 0.0).max(axis=(1, 2))
+        jump = whole[0] / max(whole.max(), 1e-300)
+        said = f"{case} starts with a jump, of {jump:.2g} of its largest {what}"
+        if jump > JUMP:
+            raise SceneError(f"{said}; let it start from rest, {way}", key)
+        if jump > SOME_JUMP:
+            yield said
 
 
 def _clamped(scene: Scene, drive: PrescribedMotion, course: Floats, case: str) -> None:

@@ -238,7 +238,8 @@ class _Course(Section):
         frequency: f of a course sin(2 pi f t).
         rise_time: of the switch by which that begins, as of a `ramp_harmonic`.
         width: of a single push there and back, as of a `pulse`.
-        delay: of either.
+        delay: of a push until its peak, three widths or more for it to begin at rest; of a wave
+            with a `rise_time` until it has grown to one half.
     """
 
     frequency: Frequency | None = None
@@ -259,6 +260,12 @@ class _Course(Section):
             raise fault("nothing rises without a frequency", "give `frequency` too", "rise_time")
         if self.delay and self.static:
             raise fault("a load path has no delay", "give `frequency` or `width` too", "delay")
+        if self.width is not None and not self.delay:
+            remedy = f"let it come later, after three widths ({3.0 * self.width:g} s) or more"
+            raise fault("a push without a delay begins at its peak", remedy, "delay")
+        if self.delay and self.frequency is not None and self.rise_time is None:
+            what = "a wave without a rise time is not delayed: its phase is shifted alone"
+            raise fault(what, "give `rise_time` too, or no delay", "delay")
         return self
 
 

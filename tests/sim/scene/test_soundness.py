@@ -21,6 +21,11 @@ def series(start: float = 0.0, times: tuple[float, ...] = (0.0, 0.5, 1.0)) -> si
     return sim.TimeSeries(np.array(times), np.outer([start, 1.0, 2.0], [1.0, 0.0, 0.0]))
 
 
+def pushed(motion: MotionLaw) -> sim.PrescribedMotion:
+    """A force along x on the right column, whose units keep to their height and angle."""
+    return sim.PrescribedMotion(LEFT + 4, motion, np.array([[FORCE, 0, 0]] * 5))
+
+
 def crossed(unit: int) -> Floats:
     """Two neighbouring corners of a unit swapped."""
     vertices = rotating_squares().vertices.copy()
@@ -42,7 +47,15 @@ REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
     "twice": (scene(series(times=(0.0, 0.5, 0.5))), "do not ascend", "drive.file"),
     "too short": (scene(series(times=(0.0, 0.2, 0.9))), "from 0 to 0.9 s", "drive.file"),
     "too late": (scene(series(times=(0.1, 0.2, 1.0))), "from 0.1 to 1 s", "drive.file"),
-    "jump": (scene(series(start=1.0), **MOVING), "starts with a jump, of 0.5", "drive"),
+    "jump": (scene(series(start=1.0), **MOVING), "starts with a jump, of 0.5", "drive.file"),
+    "a push at its peak": (
+        scene(cases=(pushed(sim.Pulse(2.0, 0.1)),), **MOVING),
+        "of 1 of its largest force; .* a delay of three widths", "drive.delay",
+    ),
+    "a wave in mid-swing": (
+        scene(sim.Harmonic(1.0, 10.0, 0.0, 0.1, 0.02), **MOVING), "starts with a jump",
+        "drive.delay",
+    ),
     "no length": (
         scene(lattice=sim.quads(5, 5, 15.0, 0.0, 0.3)), "has no length", "lattice.ligament_length",
     ),
@@ -104,6 +117,7 @@ def test_sound_scenes_pass() -> None:
             cases=(sim.PrescribedMotion(LEFT + 4, PULLED, np.array([[0, FREE, 0]] * 5)),),
         ),
         scene(sim.Harmonic(3.0, 10.0), supports=(), **MOVING),
+        scene(cases=(pushed(sim.Pulse(2.0, 0.1, np.pi, 0.4)),), **MOVING),
         scene(  # each case holds what the other one moves
             cases=tuple(
                 sim.PrescribedMotion(units, sim.LinearRamp(size, 1.0))
