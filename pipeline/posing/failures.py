@@ -91,7 +91,7 @@ class StoppedError(Exception):
             return without_meaning(self.error, source)
         key = _key_of_size(asked)
         lower = f"scale the motion in {key} down" if key.endswith("file") else f"lower {key}"
-        remedy = f"{lower}, or ask for solver.accuracy: tight"
+        remedy = lower if asked.static else f"{lower}, or ask for solver.accuracy: tight"
         if kept is not None:
             remedy += f"; all up to there is in {kept}"
         what = f"the {self.name} structure cannot be simulated{self._place()}: {self.error}"

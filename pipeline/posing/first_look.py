@@ -203,6 +203,7 @@ def _idle(asked: Problem) -> Iterator[str]:
     """Doubts keys of other values than by default, which nothing in the problem takes up."""
     moving, avoiding = not asked.static, asked.objective.snap == "avoid"
     keys = (
+        (asked.solver, "solver.accuracy", moving, "motions in time"),
         (asked.solver, "solver.integrator", moving, "motions in time"),
         (asked.response, "response.cycles", asked.frequency is not None, "drives with a frequency"),
         (asked.report, "report.instants", moving, "motions in time"),

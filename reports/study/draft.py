@@ -20,7 +20,7 @@ def reasons(problem: Problem, study: Problem) -> list[str]:
         for what, ours in _sizes(problem).items()
         if ours < full.get(what, ours)
     ]
-    if problem.solver.accuracy == "draft":
+    if problem.solver.accuracy == "draft" and not problem.static:
         reduced.append("accuracy of the solver: draft")
     return reduced
 

@@ -174,6 +174,7 @@ def test_a_stop_blames_the_size_of_the_drive(tmp_path: Path, drive: str, key: st
     told = stopped.explain(asked, path)
     assert told.key == key
     assert key in str(told.remedy)
+    assert ("solver.accuracy" in str(told.remedy)) is not asked.static
 
 
 def test_forces_on_what_nothing_holds_are_refused(tmp_path: Path) -> None:

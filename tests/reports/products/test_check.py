@@ -99,6 +99,7 @@ def test_pictures_beyond_the_load_are_doubted(
 @pytest.mark.parametrize(
     ("section", "key", "value"),
     [
+        ("solver", "accuracy", "tight"),
         ("solver", "integrator", "explicit"),
         ("response", "cycles", 2.0),
         ("report", "instants", (0.5,)),

@@ -100,7 +100,7 @@ def test_the_same_dataset_gives_the_same_bytes(tmp_path: Path, drawn_map: Path) 
 def test_the_figure_of_a_draft_is_marked(tmp_path: Path, drawn_map: Path) -> None:
     """Mark the file too, which goes on without its page."""
     at, data = paths(
-        tmp_path, f"{CURVE}\npresets: {{ quick: {{ solver: {{ accuracy: draft }} }} }}\n"
+        tmp_path, f"{CURVE}\npresets: {{ quick: {{ drive: {{ amplitude: 1 mm }} }} }}\n"
     )
     asked = problem.load(at, "quick")
     held = datasets.read(data, "sweep")

@@ -34,6 +34,19 @@ def test_loads_are_compared_by_their_size(tmp_path: Path, ours: float, reason: l
     assert draft.reasons(torque(tmp_path, ours), torque(tmp_path, -200.0)) == reason
 
 
+@pytest.mark.parametrize(
+    ("frequency", "reason"), [(None, []), (4.0, ["accuracy of the solver: draft"])]
+)
+def test_a_draft_is_one_of_motions_in_time(
+    tmp_path: Path, frequency: float | None, reason: list[str]
+) -> None:
+    asked = torque(tmp_path, 200.0)
+    drive = asked.drive.model_copy(update={"frequency": frequency})
+    study = asked.model_copy(update={"drive": drive})
+    solver = study.solver.model_copy(update={"accuracy": "draft"})
+    assert draft.reasons(study.model_copy(update={"solver": solver}), study) == reason
+
+
 def test_a_force_is_no_less_than_a_displacement(tmp_path: Path) -> None:
     push = driven(tmp_path, kind="force", amplitude="5 N", direction="180 deg")
     ramp = {"kind": "linear_ramp", "duration": "1 s", "direction": "180 deg"}
