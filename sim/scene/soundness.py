@@ -204,8 +204,7 @@ def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iter
     if scene.loads.static:
         others = np.setdiff1d(scene.loads.held, displaced(drive))
         _held_back(others, course, case)
-        if len(drive.loaded) > 0:
-            _supported(scene, case)
+        _supported(scene, case)
         return
     yield from _jumps(scene, drive, whole, case)
 
@@ -266,15 +265,18 @@ def _series(motion: TimeSeries, case: str, end: float) -> None:
 
 
 def _supported(scene: Scene, case: str) -> None:
-    """Refuses static forces on a structure that is free to move or turn as a rigid body."""
+    """Refuses a static load of a structure that is free to move or turn as a rigid body.
+
+    What is driven counts as held.
+    """
     unit, dof = np.divmod(scene.loads.held, 3)
     x, y = ((scene.lattice.site - scene.lattice.site.mean(axis=0)) / scene.lattice.spacing)[unit].T
     turned = np.select([dof == 0, dof == 1], [-y, x], 1.0)
     modes = np.stack([dof == 0, dof == 1, turned], axis=1)
     if np.linalg.matrix_rank(modes) < modes.shape[1]:
         raise SceneError(
-            f"nothing holds the structure against the forces of {case}: it can move or turn as one;"
-            " clamp some units",
+            f"nothing holds the structure against {case}: it can move or turn as one; clamp some"
+            " units",
             "supports",
         )
 

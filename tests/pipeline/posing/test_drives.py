@@ -180,7 +180,7 @@ def test_a_stop_blames_the_size_of_the_drive(tmp_path: Path, drive: str, key: st
 def test_forces_on_what_nothing_holds_are_refused(tmp_path: Path) -> None:
     path = written(tmp_path, f"drive: {PUSH}")
     path.write_text(path.read_text().replace("units: left", "units: left\n    clamp: [ux]"))
-    with pytest.raises(UserError, match="nothing holds the structure against the forces"):
+    with pytest.raises(UserError, match="against load case 0: it can move or turn as one"):
         scene_of(load(path), tmp_path)
 
 

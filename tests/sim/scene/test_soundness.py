@@ -43,6 +43,17 @@ REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
     "shaken beyond": (scene(sim.Harmonic(90.0, 10.0), **MOVING), "90 mm", "drive.amplitude"),
     "no supports": (scene(supports=()), "moves along as one; clamp", "supports"),
     "supports across": (scene(supports=(sim.Clamp(LEFT, ("uy",)),)), "moves along", "supports"),
+    "plates that slide": (  # on a rail at the left, and freely along the right edge
+        scene(
+            supports=(sim.Clamp(LEFT, ("ux", "theta")),),
+            cases=(
+                sim.PrescribedMotion(
+                    LEFT + 4, sim.LinearRamp(-3.0, 1.0), np.array([[0, FREE, 0]] * 5)
+                ),
+            ),
+        ),
+        "against load case 0: it can move or turn as one", "supports",
+    ),
     "unsorted": (scene(series(times=(0.0, 0.7, 0.5))), "do not ascend", "drive.file"),
     "twice": (scene(series(times=(0.0, 0.5, 0.5))), "do not ascend", "drive.file"),
     "too short": (scene(series(times=(0.0, 0.2, 0.9))), "from 0 to 0.9 s", "drive.file"),
