@@ -11,12 +11,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, TypeVar
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 import scipy.sparse.linalg as spla
 
 from sim.core import Floats, SimulationError
-from sim.energy import Topology
 from sim.linalg import OF_MOTIONS
 from sim.scene.scene import DIRECTED, Accuracy, Scene
 from sim.solvers import (
@@ -188,7 +188,7 @@ class _Error:
         """Bounds the error of stage velocities by what a motion itself needs, mm/s."""
         scene, stops = self._scene, _breakpoints(self._drives, self._end)
         rate = scene.loads.drive_frequency or 1.0 / self._end
-        sizes = [_size(scene.topology, self._end, self._values, d, stops) for d in self._drives]
+        sizes = [_size(scene, self._end, self._values, each, stops) for each in self._drives]
         return max(NEWTON, STAGE_SHARE * self._rule.motion * min(sizes) * rate)
 
     def motions(self, solver: S) -> tuple[list[Floats] | None, S]:
@@ -328,7 +328,7 @@ def _first_grid(
     )  # fmt: skip
     if frequency is not None:
         return replace(solver, times=time_grid.through(steps, stops))
-    sizes = [_size(scene.topology, end, values, drive, stops) for drive in drives]
+    sizes = [_size(scene, end, values, drive, stops) for drive in drives]
     grids = [
         adapted(solver, values, drive, rule.per_step * size, rule.first, largest, stops, most).times
         for drive, size in zip(drives, sizes, strict=True)
@@ -341,10 +341,13 @@ def _breakpoints(drives: Sequence[PrescribedMotion], end: float) -> Floats:
 
 
 def _size(
-    top: Topology, end: float, values: ConcreteParameters, drive: PrescribedMotion, stops: Floats
+    scene: Scene, end: float, values: ConcreteParameters, drive: PrescribedMotion, stops: Floats
 ) -> float:
-    """Finds how far a drive goes, or its forces push slowly, mm (rotations times their scale)."""
-    held = top.unloaded.held
+    """Finds how far a drive goes, or its forces push slowly, mm (rotations times their scale).
+
+    A push counts as the lattice's length at most: it leads a structure that floats anywhere.
+    """
+    top, held = scene.topology, scene.topology.unloaded.held
     at = np.union1d(np.linspace(0.0, end, SAMPLES), stops)
     size = np.abs(drive.values(top.held, at)[:, : len(held)] * top.scale[held]).max(initial=0.0)
     if len(drive.loaded) > 0:
@@ -353,8 +356,11 @@ def _size(
         most = most[sizes.argmax()]
         of, right = linearised(top, values), np.zeros(3 * top.n_units)
         np.add.at(right, 3 * drive.units[:, None] + np.arange(3), most)
-        pushed = spla.spsolve(of.stiffness, right[of.free])
-        size = max(size, np.abs(pushed * top.scale[of.free]).max(initial=0.0))
+        with catch_warnings():
+            simplefilter("ignore", spla.MatrixRankWarning)
+            pushed = spla.spsolve(of.stiffness, right[of.free])
+        far = np.abs(pushed * top.scale[of.free]).max(initial=0.0)
+        size = max(size, np.fmin(far, np.ptp(scene.lattice.vertices, axis=0).max()))
     return float(size) or 1.0
 
 

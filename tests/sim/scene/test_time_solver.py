@@ -11,12 +11,12 @@ import pytest
 import sim
 from sim.scene import concrete_parameters, estimated_errors, sample_times, scales
 from sim.scene.time_solver import RULES, different_drives, expected_steps
-from sim.solvers import breakpoints, solve_case
+from sim.solvers import FORCE, breakpoints, solve_case
 from sim.structure import ContactModel
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 from tests.sim.scene.test_plan import design_of
 from tests.sim.scene.test_plan import scene as seven_by_seven
-from tests.sim.structures import central, taylor_orders
+from tests.sim.structures import MATERIAL, central, rotating_squares, taylor_orders
 from tests.tables import some
 
 KNOTS = np.linspace(0.0, 0.2, 201)
@@ -61,6 +61,24 @@ def test_a_motion_of_units_without_mass_is_refused() -> None:
     for integrator in ("auto", "explicit"):
         with pytest.raises(sim.SimulationError, match="unit 0 has no mass"):
             sim.make_plan(weightless.updated(integrator=integrator))
+
+
+def test_a_pushed_structure_that_floats_is_followed_as_by_explicit_steps() -> None:
+    """Its slow push has no end, and so no share that a step may miss."""
+    push = sim.PrescribedMotion(
+        np.array([5]), sim.Pulse(1.0, 0.02, 0.0, 0.08), np.array([[FORCE, 0, 0]])
+    )
+    floating = sim.Scene(
+        sim.Structure(rotating_squares(4), MATERIAL),
+        sim.Loads((push,), duration=0.2),
+        sim.Objective(region=np.array([0, 3, 12, 15]), samples=51),
+        numerics=sim.Numerics("draft", "implicit"),
+    )
+    one, other = (
+        sim.simulate(floating.updated(integrator=name), vertices=floating.lattice.vertices)
+        for name in ("implicit", "explicit")
+    )
+    np.testing.assert_allclose(one.losses, other.losses, rtol=RULES["draft"].loss)
 
 
 def test_numbers_of_a_drive_may_be_arrays() -> None:
