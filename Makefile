@@ -73,6 +73,9 @@ dev: .venv/requirements-dev.lock
 	@test -e $@ || $(PYTHON) -m venv --clear .venv
 	@rm -f $@
 	@$(INSTALL) requirements.lock
+	@for each in $${CC:-cc} gcc clang; do command -v "$$each" >/dev/null && exit; done; \
+	    echo "No compiler of C is here: adding the one of requirements-compiler.lock" >&2; \
+	    $(INSTALL) requirements-compiler.lock
 	@cp requirements.lock $@
 
 .venv/requirements-dev.lock: requirements-dev.lock | setup
@@ -84,6 +87,7 @@ dev: .venv/requirements-dev.lock
 # Into the same folder for every Python that is to be served: make wheels WHEELS=folder PYTHON=python3.12
 wheels:
 	@$(PYTHON) -m pip download --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock \
+	    -r requirements-compiler.lock \
 	    --dest "$(or $(WHEELS),wheels)"
 
 $(STUDIES) $(PAGES): setup
@@ -176,6 +180,8 @@ lock: setup
 	sed -i $(ITSELF) requirements.lock
 	$(LOCK) --extra dev --constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
 	sed -i $(ITSELF) requirements-dev.lock
+	$(LOCK) --extra compiler --constraint requirements.lock --output-file requirements-compiler.lock pyproject.toml
+	sed -i $(ITSELF) requirements-compiler.lock
 
 clean:
 	rm -rf results .cache .snakemake .hypothesis .mypy_cache .pytest_cache .ruff_cache

@@ -16,7 +16,7 @@ import psutil
 from benchmarks.harness.records import Run, Sample
 from pipeline.runtime import UserError
 
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _PATIENCE = 1.0
 """Seconds between two looks at what a worker has spent."""
 

@@ -1,7 +1,6 @@
-"""Compiles loops anew in a process of its own; nothing that loads Numba is imported before.
+"""Compiles the solver anew in a process of its own, where no library of it is loaded before.
 
-The constants of compiled loops are part of their machine code, so a change of one needs this too.
-Packages are lazy: their modules, and Numba with them, are loaded by the first use of a name.
+The constants of its loops are part of its machine code, so a change of one needs this too.
 """
 
 import os
@@ -12,12 +11,11 @@ from typing import Literal
 
 from benchmarks import methods, scenes
 from benchmarks.harness import Run, Sample, Task
-from sim import quasistatics, time_integration
 from sim import scene as sim_scene
 
 
 def compilation(name: str, skipped: float, _: Task) -> Run:
-    """Times the first result of a process, with its loops from the disk or compiled for it."""
+    """Times the first result of a process, with the solver from the disk or compiled for it."""
 
     def run() -> Sample:
         if skipped:
@@ -36,17 +34,15 @@ def factors(name: str, skipped: float, _: Task) -> Run:
     if skipped:
         return _default(name, integrator="implicit")
     with _no_cache():
-        stage = time_integration.esdirk_stage
-        stage.PATIENCE, stage.KEEP_BELOW = 0, 0.0
-        quasistatics.newton.KEEP_FACTOR = quasistatics.newton.RENEW_FACTOR = 0.0
+        os.environ["METACLOAK_CFLAGS"] = "-DNO_KEPT_FACTORS"
         return _default(name, integrator="implicit")
 
 
 @contextmanager
 def _no_cache() -> Iterator[None]:
-    """Lends an empty folder to what is compiled. Numba reads where it is as it is imported."""
+    """Lends an empty folder to what is compiled."""
     with TemporaryDirectory() as folder:
-        os.environ["NUMBA_CACHE_DIR"] = folder
+        os.environ["XDG_CACHE_HOME"] = folder
         yield
 
 

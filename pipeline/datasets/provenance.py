@@ -9,7 +9,6 @@ import hashlib
 import json
 import platform
 import subprocess
-import sys
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib import metadata
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
 COMMIT_FILE = "COMMIT"
 """Names the commit of sources that were published without their history."""
-PACKAGES = ("jax", "jaxlib", "netCDF4", "numba", "numpy", "piqp", "scipy", "shapely", "xarray")
+PACKAGES = ("jax", "jaxlib", "netCDF4", "numpy", "piqp", "scipy", "shapely", "xarray")
 
 
 def of_study(
@@ -112,7 +111,7 @@ def package_versions() -> Mapping[str, str]:
 
 
 def instructions() -> str:
-    """Names the level of instructions, and what is loaded of NumPy, BLAS and Numba that leaves it.
+    """Names the level of instructions, and what is loaded of NumPy and BLAS that leaves it.
 
     A library keeps to the level only if it is loaded after that is asked for. Of XLA nothing can be
     seen: it reads its flag when it first compiles.
@@ -124,13 +123,7 @@ def instructions() -> str:
         if core.__cpu_features__[each] and each.startswith(("X86_V4", "AVX512"))
     ]
     blas = {row.get("architecture", "Haswell") for row in threadpool_info()} - {"Haswell"}
-    numba = sys.modules.get("numba.core.config")
-    target = None if numba is None else numba.CPU_NAME
-    found = {
-        "NumPy": wider,
-        "OpenBLAS": sorted(blas),
-        "Numba": [] if target in (None, instruction_set.LEVEL) else [target],
-    }
+    found = {"NumPy": wider, "OpenBLAS": sorted(blas)}
     told = ", ".join(f"{name} {' '.join(each)}" for name, each in found.items() if each)
     if not (told and instruction_set.can_pin()):
         return instruction_set.level()

@@ -22,10 +22,9 @@ from .locations import ROOT as ROOT
 from .locations import WORK as WORK
 from .locations import version as version
 from .old_commands import keep_old_commands as keep_old_commands
+from .pixel_loops import PIXEL_LOOPS as PIXEL_LOOPS
 from .pixel_loops import Picture as Picture
 from .pixel_loops import compiled as compiled
-from .pixel_loops import inlined as inlined
-from .pixel_loops import uncounted as uncounted
 from .source_closure import source_hash as source_hash
 from .stage_server import delegate as delegate
 from .stage_table import REPORTED as REPORTED

@@ -152,6 +152,8 @@ def _told(error: Exception, args: argparse.Namespace) -> int:
         return 2
     if isinstance(error, OSError):
         LOG.error("error: %s", refusal(error.filename or ".", error))
+    elif remedy := getattr(error, "remedy", None):  # no compiler, for one
+        LOG.error("error: %s", UserError(str(error), remedy=remedy))
     elif isinstance(error, MemoryError):
         remedy = "ask for fewer samples, cases or units, or take a machine with more of it"
         LOG.error("error: %s", UserError("the memory is full", remedy=remedy))

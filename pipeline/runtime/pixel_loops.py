@@ -1,37 +1,14 @@
 """Compiles loops over pixels, and names the type of a picture."""
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from pathlib import Path
 
-from sim.core import Image, Singles, compiling
+from sim.core import CLibrary, Image, Singles
 
 Picture = Image | Singles
 """Brightness from 0 to 255, in steps of one or finer."""
 
-F = TypeVar("F", bound=Callable[..., Any])
+_SUMS = ("-fassociative-math", "-fno-signed-zeros", "-freciprocal-math", "-ffp-contract=fast")
+"""What the compiler may do to sums, which are the same on every run; NaN stays NaN."""
 
-
-_SUMS = {"reassoc", "contract", "arcp", "nsz"}
-"""What fast mathematics may do to them."""
-
-
-def compiled(function: F) -> F:
-    """Compiles a loop once and caches it on disk; sums may be reordered, NaN stays NaN.
-
-    What it calls must be `inlined`: sums of a loop of its own would be ordered in one way when the
-    caller has just been compiled, and in another when it comes from the cache.
-    """
-    return compiling.compiled(function, fastmath=_SUMS)
-
-
-def uncounted(function: F) -> F:
-    """Compiles a loop likewise that allocates no arrays, and counts no references to any.
-
-    Each view of an array is counted, in one instruction that locks a processor's bus.
-    """
-    return compiling.compiled(function, fastmath=_SUMS, _nrt=False)
-
-
-def inlined(function: F) -> F:
-    """Makes a loop a part of the `compiled` ones that call it."""
-    return compiling.inlined(function, fastmath=_SUMS)
+PIXEL_LOOPS = CLibrary(Path(__file__).resolve().parents[1], _SUMS)
+compiled = PIXEL_LOOPS.compiled

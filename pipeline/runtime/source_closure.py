@@ -16,7 +16,9 @@ from pathlib import Path
 from pipeline.runtime.locations import CACHE, ROOT
 from sim.core import PACKAGES, import_closure, locate
 
-RESOURCES = {".css", ".csv", ".html", ".j2", ".js", ".json", ".mplstyle", ".svg", ".toml", ".yaml"}
+_C = {".c", ".h"}
+_SHOWN = {".css", ".html", ".j2", ".js", ".mplstyle", ".svg"}
+RESOURCES = _C | _SHOWN | {".csv", ".json", ".toml", ".yaml"}
 
 
 @cache
@@ -61,7 +63,8 @@ def source_files(module: str, root: Path = ROOT) -> tuple[Path, ...]:
 
     These are the modules reached by import statements, at any depth and inside functions too, the
     packages that hold them, and the resources (templates, styles) in the folders of those packages;
-    one that bears the name of a module beside it goes with that module. A name that is imported
+    one that bears the name of a module beside it goes with that module, unless it is of C, whose
+    files use each other. A name that is imported
     from a lazy package leads to the module that its stub names.
 
     Raises:
@@ -74,7 +77,11 @@ def source_files(module: str, root: Path = ROOT) -> tuple[Path, ...]:
     found = set(modules.values())
     resources = (file for package in packages for file in _resources(package))
     module_of = {file: file.with_suffix(".py") for file in resources}
-    own = {file for file, module in module_of.items() if module in found or not module.exists()}
+    own = {
+        file
+        for file, module in module_of.items()
+        if module in found or not module.exists() or file.suffix in _C
+    }
     return tuple(sorted(found | own))
 
 

@@ -32,7 +32,7 @@ from pipeline.workflow.studies import problem_of
 LOG = logging.getLogger(__name__)
 
 _BESIDE = ("LICENSE", "CITATION.cff", "README.md", "Makefile", "pyproject.toml", "setup.py")
-_LOCKS = ("requirements.lock", "requirements-dev.lock")
+_LOCKS = ("requirements.lock", "requirements-dev.lock", "requirements-compiler.lock")
 _FOLDERS = ("benchmarks", "docs", "metacloak")
 _NOT_SOURCES = shutil.ignore_patterns("__pycache__", "*.pyc", "*.egg-info")
 

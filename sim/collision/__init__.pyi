@@ -5,7 +5,5 @@ from .candidate_pairs import new_pairs as new_pairs
 from .candidate_pairs import raise_new_pairs as raise_new_pairs
 from .neighbour_list import find as find
 from .neighbour_list import pairs_in_contact as pairs_in_contact
-from .neighbour_list import term as term
-from .neighbour_list import units_met as units_met
 from .polygons import ContactArrays as ContactArrays
 from .step_limit import collision_free_step as collision_free_step

@@ -1,11 +1,8 @@
 """Outlines of units in a state: where they are, how near two come, and whether they cross."""
 
-import math
 from typing import NamedTuple
 
-import numpy as np
-
-from sim.core import Floats, Ints, compiled
+from sim.core import Floats, Ints
 
 
 class NeighbourCache(NamedTuple):
@@ -40,76 +37,3 @@ class ContactArrays(NamedTuple):
     reach: float  # distance up to which the sweep finds pairs, mm
     margin: float  # motion of a unit after which it is repeated, mm
     cache: NeighbourCache  # scratch
-
-
-@compiled
-def place_vertices(motion: Floats, contacts: ContactArrays) -> None:
-    """Notes the positions of all vertices and centroids in a state."""
-    cache = contacts.cache
-    for unit in range(len(contacts.radius)):
-        c, s = math.cos(motion[3 * unit + 2]), math.sin(motion[3 * unit + 2])
-        x = contacts.centroid[unit, 0] + motion[3 * unit]
-        y = contacts.centroid[unit, 1] + motion[3 * unit + 1]
-        cache.centre[unit, 0], cache.centre[unit, 1] = x, y
-        for v in range(contacts.first[unit], contacts.first[unit + 1]):
-            rx, ry = contacts.corner[v, 0], contacts.corner[v, 1]
-            cache.place[v, 0] = x + c * rx - s * ry
-            cache.place[v, 1] = y + s * rx + c * ry
-
-
-@compiled
-def _square_to_edge(v: int, p: int, q: int, place: Floats) -> float:
-    """Squared distance of vertex ``v`` to the edge from ``p`` to ``q``."""
-    ex, ey = place[q, 0] - place[p, 0], place[q, 1] - place[p, 1]
-    dx, dy = place[v, 0] - place[p, 0], place[v, 1] - place[p, 1]
-    along = min(max((dx * ex + dy * ey) / (ex * ex + ey * ey), 0.0), 1.0)
-    dx -= along * ex
-    dy -= along * ey
-    return dx * dx + dy * dy
-
-
-@compiled
-def is_inside(v: int, unit: int, contacts: ContactArrays) -> bool:
-    """Tests if vertex ``v`` lies inside a unit, by the parity of the edges to its right."""
-    place, inside = contacts.cache.place, False
-    x, y = place[v, 0], place[v, 1]
-    for p in range(contacts.first[unit], contacts.first[unit + 1]):
-        q = contacts.following[p]
-        if (place[p, 1] > y) != (place[q, 1] > y):
-            share = (y - place[p, 1]) / (place[q, 1] - place[p, 1])
-            if x < place[p, 0] + share * (place[q, 0] - place[p, 0]):
-                inside = not inside
-    return inside
-
-
-@compiled
-def _side(p: int, q: int, v: int, place: Floats) -> bool:
-    """Tests if vertex ``v`` lies to the left of the line from ``p`` to ``q``."""
-    ex, ey = place[q, 0] - place[p, 0], place[q, 1] - place[p, 1]
-    return ex * (place[v, 1] - place[p, 1]) > ey * (place[v, 0] - place[p, 0])
-
-
-@compiled
-def crosses(v: int, unit: int, contacts: ContactArrays) -> bool:
-    """Tests if the edge that starts at ``v`` crosses one of a unit's."""
-    place, w = contacts.cache.place, contacts.following[v]
-    for p in range(contacts.first[unit], contacts.first[unit + 1]):
-        q = contacts.following[p]
-        apart = _side(v, w, p, place) == _side(v, w, q, place)
-        if not apart and _side(p, q, v, place) != _side(p, q, w, place):
-            return True
-    return False
-
-
-@compiled
-def gap_between(a: int, b: int, contacts: ContactArrays) -> float:
-    """Distance of the outlines of two units, zero if they cross."""
-    smallest = np.inf
-    for one, other in ((a, b), (b, a)):
-        for v in range(contacts.first[one], contacts.first[one + 1]):
-            if one == a and crosses(v, other, contacts):
-                return 0.0
-            for p in range(contacts.first[other], contacts.first[other + 1]):
-                q = contacts.following[p]
-                smallest = min(smallest, _square_to_edge(v, p, q, contacts.cache.place))
-    return math.sqrt(smallest)

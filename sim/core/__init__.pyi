@@ -1,4 +1,3 @@
-from . import compiling as compiling
 from . import instruction_set as instruction_set
 from .arrays import Floats as Floats
 from .arrays import Image as Image
@@ -7,15 +6,14 @@ from .arrays import Mask as Mask
 from .arrays import Numbers as Numbers
 from .arrays import Reals as Reals
 from .arrays import Singles as Singles
+from .c_library import CLibrary as CLibrary
 from .compile_time import working_time as working_time
-from .compiling import compiled as compiled
-from .compiling import inlined as inlined
 from .errors import NewContactPairs as NewContactPairs
 from .errors import SimulationError as SimulationError
 from .import_graph import PACKAGES as PACKAGES
 from .import_graph import import_closure as import_closure
 from .import_graph import locate as locate
-from .outlined import address_of as address_of
-from .outlined import call_at as call_at
+from .solver_library import LIBRARY as LIBRARY
+from .solver_library import compiled as compiled
 from .temporary_folder import TEMPORARY_NAME as TEMPORARY_NAME
 from .temporary_folder import make_temporary_folder as make_temporary_folder

@@ -9,53 +9,23 @@ PACKAGES = ("sim", "pipeline", "reports", "benchmarks")
 _INSTALLED = "metacloak."  # begins their names where they are installed as one package
 
 
-def import_closure(modules: Iterable[str], root: Path, *, packages: bool = True) -> dict[str, Path]:
+def import_closure(modules: Iterable[str], root: Path) -> dict[str, Path]:
     """Maps the dotted names of modules and of all that they import, at any depth, to their files.
 
     Imports inside functions count. A name that is imported from a lazy package leads to the module
-    that its stub names. What lies outside of the project's `root` is left out, and without
-    `packages` the packages that hold a module.
+    that its stub names. What lies outside of the project's `root` is left out.
     """
     found: dict[str, Path] = {}
     waiting = list(modules)
     while waiting:
         name = waiting.pop()
         path = locate(name, root)
-        if name in found or path is None or (path.name == "__init__.py" and not packages):
+        if name in found or path is None:
             continue
         found[name] = path
-        waiting += _parents(name) if packages else []
+        waiting += _parents(name)
         waiting += _imported(path, name, root)
     return found
-
-
-def file_closure(file: Path, root: Path) -> dict[str, Path]:
-    """Maps the names of a file below the root and of all that it imports to their files.
-
-    Packages that hold a module are left out. A file outside of this project's packages, such as a
-    script or a test, may import others beside it or below the root.
-    """
-    module = _module_of(file, root)
-    if locate(module, root) is not None:
-        return import_closure([module], root, packages=False)
-    found: dict[str, Path] = {}
-    waiting = [file]
-    while waiting:
-        path = waiting.pop()
-        module = _module_of(path, root)
-        if module in found:
-            continue
-        found[module] = path
-        names = _imported(path, module, root)
-        found |= import_closure(names, root, packages=False)
-        others = [f"{name.replace('.', '/')}.py" for name in names if not locate(name, root)]
-        places = (folder / name for folder in {path.parent, root} for name in others)
-        waiting += filter(Path.is_file, places)
-    return found
-
-
-def _module_of(file: Path, root: Path) -> str:
-    return ".".join(file.relative_to(root).with_suffix("").parts)
 
 
 @cache

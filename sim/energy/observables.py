@@ -8,13 +8,11 @@ import numpy as np
 from jax import Array
 
 from sim.collision import raise_new_pairs
-from sim.core import Floats, Ints, NewContactPairs, call_at, compiled
+from sim.core import Floats, Ints, NewContactPairs, compiled
 from sim.energy.connectivity import Topology
-from sim.energy.contact_calls import PAIRS
 from sim.energy.ligament import LigamentStrain, ligament_strain
 from sim.energy.network_arrays import Kinematics
 from sim.energy.system import System, kinematics_of, system_of
-from sim.energy.total import gradient
 from sim.structure import ConcreteParameters, VoidAngleContact
 
 BLOCK = 64
@@ -52,12 +50,9 @@ class Observables(NamedTuple):
 @compiled
 def _visit(
     states: Floats, system: System, kinematics: Kinematics, energies: Floats, forces: Floats,
-    pairs: Ints,
+    pairs: Ints, n_states: int = 0,
 ) -> None:  # fmt: skip
-    for n in range(len(states)):
-        energies[n] = gradient(states[n], system, kinematics, forces[n])
-        if len(system.contacts.pairs) > 0:
-            pairs[n] = call_at(system.calls[PAIRS], 0, (states[n], system.contacts))
+    """Fills the energies (n_states, 2) of states, their gradients, and pairs in contact."""
 
 
 def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> Observables:

@@ -7,7 +7,6 @@ import numpy as np
 from sim.collision import ContactArrays, contact_arrays
 from sim.core import Floats, Ints
 from sim.energy.connectivity import Topology
-from sim.energy.contact_calls import contact_calls
 from sim.energy.network_arrays import Kinematics, NetworkArrays, Sensitivity, no_sensitivity
 from sim.linalg import Matrix, Pattern, matrix
 from sim.structure import ConcreteParameters
@@ -18,7 +17,6 @@ class System(NamedTuple):
 
     net: NetworkArrays  # ligaments, and contact on their void angles
     contacts: ContactArrays  # contact on the distance of units
-    calls: Ints  # (6,) addresses of its kernels
     mass: Floats  # (n_dofs,) diagonal
     damping: Floats  # (n_dofs,) diagonal
     free: Ints  # (n_dofs,) number of each dof among the free ones, negative where held
@@ -79,7 +77,6 @@ def system_of(
     return System(
         net=net,
         contacts=contacts,
-        calls=contact_calls(net, contacts, pattern),
         mass=np.concatenate([np.ravel(values.mass), loads]),
         damping=np.concatenate([np.ravel(values.damping), 0.0 * loads]),
         free=free,

@@ -1,53 +1,14 @@
-"""Factorises and solves banded systems, and orders the dofs for a small bandwidth."""
+"""Orders the dofs for a small bandwidth."""
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from sim.core import Floats, Ints, compiled
-from sim.linalg.lapack import dpbtrf, dpbtrs
-from sim.linalg.narrow_cholesky import factorise_narrow
+from sim.core import Ints
 
 NARROW = 100
 """Columns of a band up to which the own factorisation beats LAPACK's."""
-
-
-@compiled
-def factorise(band: Floats) -> bool:
-    """Factorises a lower band (n, width + 1) in place; False if not positive definite."""
-    if band.shape[1] <= NARROW:
-        return factorise_narrow(band)
-    uplo = np.full(1, ord("L"), dtype=np.uint8)
-    size = np.array([band.shape[0], band.shape[1] - 1, band.shape[1], 0], dtype=np.int32)
-    dpbtrf(
-        uplo.ctypes,
-        size[0:1].ctypes,
-        size[1:2].ctypes,
-        band.ctypes,
-        size[2:3].ctypes,
-        size[3:4].ctypes,
-    )
-    # LAPACK takes NaN for a pivot, and makes all that follow NaN
-    return size[3] == 0 and bool(np.isfinite(band[-1, 0]))
-
-
-@compiled
-def solve(factor: Floats, right: Floats) -> None:
-    """Overwrites ``right`` (n,) with the solution for a factor of ``factorise``."""
-    uplo = np.full(1, ord("L"), dtype=np.uint8)
-    size = np.array([factor.shape[0], factor.shape[1] - 1, 1, factor.shape[1], 0], dtype=np.int32)
-    dpbtrs(
-        uplo.ctypes,
-        size[0:1].ctypes,
-        size[1:2].ctypes,
-        size[2:3].ctypes,
-        factor.ctypes,
-        size[3:4].ctypes,
-        right.ctypes,
-        size[0:1].ctypes,
-        size[4:5].ctypes,
-    )
 
 
 def number_free_dofs(n_units: int, unit_pairs: Ints, held: Ints) -> tuple[NDArray[np.int64], int]:

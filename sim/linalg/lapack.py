@@ -1,39 +1,33 @@
-"""Routines of LAPACK and BLAS for compiled code, on one thread."""
+"""Hands routines of LAPACK and BLAS to compiled code, those that SciPy brings, on one thread."""
 
-from collections.abc import Callable
+import ctypes
 
 import scipy.linalg.cython_blas
-import scipy.linalg.cython_lapack  # noqa: F401  (function addresses are looked up below)
-from llvmlite import binding
-from numba import types
-from numba.extending import get_cython_function_address
+import scipy.linalg.cython_lapack
 from threadpoolctl import threadpool_limits
+
+from sim.core import LIBRARY
 
 threadpool_limits(1, user_api="blas")  # threads make factorisations of this size 8-30 times slower
 
-_POINTER, _INTEGER, _CHARACTER = (
-    types.CPointer(kind)  # type: ignore[no-untyped-call]
-    for kind in (types.float64, types.int32, types.uint8)
-)
-_TYPES = {"d": _POINTER, "i": _INTEGER, "c": _CHARACTER}
+_ROUTINES = {
+    scipy.linalg.cython_lapack: ("dpbtrf", "dpbtrs", "dpotrf"),
+    scipy.linalg.cython_blas: ("dtrsm", "dsyrk", "dtrsv", "dgemv"),
+}
 
 
-def _routine(library: str, name: str, arguments: str) -> Callable[..., None]:
-    """Looks a routine of "blas" or "lapack" up, so that compiled callers can be cached.
-
-    The arguments are a letter for each pointer: d double, i integer, c character.
-    """
-    symbol = f"sim_{name}"
-    binding.add_symbol(symbol, get_cython_function_address(f"scipy.linalg.cython_{library}", name))
-    kinds = (_TYPES[letter] for letter in arguments)
-    made: Callable[..., None] = types.ExternalFunction(symbol, types.void(*kinds))
-    return made
+@LIBRARY.prepared
+def hand_over(library: ctypes.CDLL) -> None:
+    """Fills the pointers of ``lapack.c``."""
+    for module, names in _ROUTINES.items():
+        for name in names:
+            ctypes.c_void_p.in_dll(library, name).value = _address(module.__pyx_capi__[name])
 
 
-dpbtrf = _routine("lapack", "dpbtrf", "ciidii")
-dpbtrs = _routine("lapack", "dpbtrs", "ciiididii")
-dpotrf = _routine("lapack", "dpotrf", "cidii")
-dtrsm = _routine("blas", "dtrsm", "cccciiddidi")
-dsyrk = _routine("blas", "dsyrk", "cciiddiddi")
-dtrsv = _routine("blas", "dtrsv", "cccididi")
-dgemv = _routine("blas", "dgemv", "ciiddididdi")
+def _address(capsule: object) -> int:
+    """Reads the address in a capsule of Cython, whose name is the routine's signature."""
+    name_of, address_in = ctypes.pythonapi.PyCapsule_GetName, ctypes.pythonapi.PyCapsule_GetPointer
+    name_of.restype, name_of.argtypes = ctypes.c_char_p, [ctypes.py_object]
+    address_in.restype = ctypes.c_void_p
+    address_in.argtypes = [ctypes.py_object, ctypes.c_char_p]
+    return int(address_in(capsule, name_of(capsule)))

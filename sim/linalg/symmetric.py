@@ -9,19 +9,9 @@ import numpy as np
 
 from sim.core import Floats, Ints, compiled
 from sim.linalg import banded as band
-from sim.linalg.multifrontal import entry_of_fronts, factorise_fronts, solve_fronts
+from sim.linalg import lapack  # noqa: F401  (hands its routines over)
 from sim.linalg.nested_dissection import Fronts, dissect, fronts_of, no_fronts
-from sim.linalg.panels import (
-    Panels,
-    entry_of_panels,
-    factorise_panels,
-    fill_padding,
-    no_panels,
-    panels_of,
-    reach_of,
-    solve_panels,
-)
-from sim.linalg.row_products import WIDTH
+from sim.linalg.panels import WIDTH, Panels, no_panels, panels_of, reach_of
 
 NARROW_FLOP, BAND_FLOP, FRONT_FLOP, FRONT_CALL, PANEL_FLOP = 72e-12, 42e-12, 58e-12, 2e-6, 47e-12
 """Seconds of one core for a multiplication of each method, and for a front's calls."""
@@ -33,6 +23,8 @@ OF_EQUILIBRIA: tuple[Storage, ...] = ("band", "fronts")
 equilibria are pinned to the last bit, and each way to solve rounds in its own way."""
 OF_MOTIONS: tuple[Storage, ...] = ("panels", "fronts")
 
+NARROW = 100
+"""Columns of a band up to which a factorisation of our own beats LAPACK's, as in ``banded.c``."""
 BY_FRONTS, BY_PANELS = -1, -2
 
 
@@ -105,7 +97,7 @@ def seconds(pattern: Pattern) -> float:
     """Predicts the time of one core to factorise a matrix of that pattern, s."""
     if pattern.storage == "band":
         n, width = (float(number) for number in pattern.size)
-        return (NARROW_FLOP if width < band.NARROW else BAND_FLOP) * n * width**2
+        return (NARROW_FLOP if width < NARROW else BAND_FLOP) * n * width**2
     if pattern.storage == "panels":
         return float(PANEL_FLOP * (np.diff(pattern.panels.first).astype(float) ** 2 / 4).sum())
     own, edge = (
@@ -154,9 +146,6 @@ def matrix(pattern: Pattern) -> Matrix:
 @compiled
 def clear(of: Matrix) -> None:
     """Sets all entries to zero."""
-    of.values[:] = 0.0
-    if of.pattern.size[1] == BY_PANELS:
-        fill_padding(of.values, of.pattern.size[0], of.pattern.panels.first)
 
 
 @compiled
@@ -165,27 +154,13 @@ def entry(pattern: Pattern, i: int, j: int) -> int:
 
     They must be in the pattern.
     """
-    if i < 0 or j < 0:
-        return -1
-    row, column = max(i, j), min(i, j)
-    width = pattern.size[1]
-    if width >= 0:
-        return column * width + row
-    if width == BY_PANELS:
-        return entry_of_panels(row, column, pattern.panels.first)
-    f = pattern.fronts
-    return entry_of_fronts(row, column, f.owner, f.first, f.edge, f.boundary, f.panel)
 
 
 @compiled
 def add(of: Matrix, i: int, j: int, value: float) -> None:
     """Adds to the entries (i, j) and (j, i), which must be in the pattern; to none if negative."""
-    at = entry(of.pattern, i, j)
-    if at >= 0:
-        of.values[at] += value
 
 
-@compiled
 def block_entries(pattern: Pattern, free: Ints, pairs: Ints) -> Ints:
     """Finds where the lower halves of blocks of six by six lie among the values, row by row.
 
@@ -196,36 +171,20 @@ def block_entries(pattern: Pattern, free: Ints, pairs: Ints) -> Ints:
         (n, 21) places, -1 where a dof is held.
     """
     found = np.empty((len(pairs), 21), dtype=np.int64)
-    place = np.empty(6, dtype=np.int64)
-    for k in range(len(pairs)):
-        for m in range(6):
-            place[m] = free[3 * pairs[k, m // 3] + m % 3]
-        at = 0
-        for row in range(6):
-            for column in range(row + 1):
-                found[k, at] = entry(pattern, place[row], place[column])
-                at += 1
+    _find_blocks(pattern, free, pairs, found)
     return found
+
+
+@compiled
+def _find_blocks(pattern: Pattern, free: Ints, pairs: Ints, found: Ints, n_pairs: int = 0) -> None:
+    """Fills what ``block_entries`` returns."""
 
 
 @compiled
 def factorise(of: Matrix) -> bool:
     """Replaces the matrix by its Cholesky factor; False if it is not positive definite."""
-    n, width = of.pattern.size
-    if width >= 0:
-        return band.factorise(of.values.reshape(n, width + 1))
-    if width == BY_PANELS:
-        return factorise_panels(of.values, of.pattern.panels.first)
-    return factorise_fronts(of.values, of.scratch, of.pattern.fronts)
 
 
 @compiled
 def solve(factor: Matrix, right: Floats) -> None:
     """Overwrites ``right`` (n,) with the solution for a factor of ``factorise``."""
-    n, width = factor.pattern.size
-    if width >= 0:
-        band.solve(factor.values.reshape(n, width + 1), right)
-    elif width == BY_PANELS:
-        solve_panels(factor.values, factor.pattern.panels.first, right, factor.scratch)
-    else:
-        solve_fronts(factor.values, factor.pattern.fronts, right)

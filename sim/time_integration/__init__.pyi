@@ -1,4 +1,3 @@
-from . import esdirk_stage as esdirk_stage
 from . import explicit as explicit
 from . import implicit as implicit
 from . import time_grid as time_grid

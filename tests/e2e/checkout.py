@@ -36,9 +36,10 @@ presets: null
 ROOMS = ("benchmarks", "experiments", "metacloak", "pipeline", "profiles", "reports", "sim")
 FILES = (
     *("Snakefile", "Makefile", "CITATION.cff", "LICENSE", "README.md", "pyproject.toml"),
-    *("setup.py", "requirements.lock", "requirements-dev.lock", ".gitignore"),
+    *("setup.py", "requirements.lock", "requirements-dev.lock", "requirements-compiler.lock"),
+    ".gitignore",
 )
-_CACHES = ("NUMBA_CACHE_DIR", "JAX_COMPILATION_CACHE_DIR", "MPLCONFIGDIR")
+_CACHES = ("JAX_COMPILATION_CACHE_DIR", "MPLCONFIGDIR")
 _NOBODYS = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull}
 _DATED = {"GIT_AUTHOR_DATE": "2025-01-01T00:00:00Z", "GIT_COMMITTER_DATE": "2025-01-01T00:00:00Z"}
 

@@ -1,10 +1,13 @@
 """Draws mutants of modules by the operators of cosmic-ray, in an environment that has it.
 
+Of files of C an operator, a comparison or a number is replaced.
+
 ``python draw.py SEED COUNT MODULES...`` prints a line of JSON for each mutant.
 """
 
 import ast
 import json
+import re
 import sys
 from contextlib import suppress
 from functools import cache
@@ -45,9 +48,38 @@ def _count(operator: Operator, code: str) -> int:
     return sum(len(list(operator.mutation_positions(node))) for node in ast_nodes(get_ast(code)))
 
 
+_REPLACED = {
+    " + ": (" - ", " * "), " - ": (" + ",), " * ": (" / ", " + "), " / ": (" * ",),
+    " < ": (" <= ", " > "), " > ": (" >= ", " < "), " <= ": (" < ",), " >= ": (" > ",),
+    " == ": (" != ",), " != ": (" == ",), " && ": (" || ",), " || ": (" && ",),
+    " += ": (" -= ",), " -= ": (" += ",), "0.5 *": ("0.25 *",), "2.0 *": ("3.0 *",),
+    "[0]": ("[1]",), " + 1]": (" + 2]",), "true": ("false",), "false": ("true",),
+}  # fmt: skip
+_PLACES = re.compile("|".join(map(re.escape, sorted(_REPLACED, key=len, reverse=True))))
+_UNREAD = re.compile(r"/\*.*?\*/|^#.*?$", re.DOTALL | re.MULTILINE)
+
+
+def _drawn_of_c(path: str, code: str, random: Random) -> dict[str, str]:
+    """Replaces one operator or number outside comments and directives."""
+    unread = [found.span() for found in _UNREAD.finditer(code)]
+    places = [
+        found
+        for found in _PLACES.finditer(code)
+        if not any(first <= found.start() < end for first, end in unread)
+    ]
+    if not places:
+        raise SystemExit(f"nothing to mutate in {path}")
+    chosen = random.choice(places)
+    new = random.choice(_REPLACED[chosen.group()])
+    mutated = code[: chosen.start()] + new + code[chosen.end() :]
+    return {"path": path, "operator": f"{chosen.group().strip()} -> {new.strip()}", "code": mutated}
+
+
 def drawn(path: str, random: Random) -> dict[str, str]:
     """Draws a mutant that means something else than the module."""
     code = Path(path).read_text(encoding="utf-8")
+    if path.endswith(".c"):
+        return _drawn_of_c(path, code, random)
     meant = _meaning(code)
     for _ in range(TRIES):
         name = random.choice(random.choice(list(_operators().values())))

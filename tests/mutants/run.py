@@ -2,7 +2,7 @@
 
 ``make mutants`` draws 200 and writes results/mutants.json. Modules come from the rooms below, each
 tried by the tests of its own room, those of its own name first, until one fails. What is heavy is
-imported once; each mutant gets a fork. Kernels run uncompiled.
+imported once; each mutant gets a fork.
 """
 
 import argparse
@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -39,9 +39,8 @@ ROOMS = {
     "reports/page": "tests/reports/page",
 }
 """Folders of the source, and of their tests."""
-UNCOMPILED = ("sim/linalg", "sim/energy")
 HEAVY = (
-    *("jax", "jax.numpy", "numba", "scipy.optimize", "xarray", "netCDF4", "pydantic", "pint"),
+    *("jax", "jax.numpy", "scipy.optimize", "xarray", "netCDF4", "pydantic", "pint"),
     *("hypothesis", "pytest", "matplotlib.pyplot", "shapely", "cv2", "ezdxf", "trimesh"),
 )
 """Packages to import once."""
@@ -60,10 +59,10 @@ class Ended:
     seconds: float
 
 
-def run(root: Path, tests: Sequence[str], limit: float, *, compiled: bool) -> Ended:
+def run(root: Path, tests: Sequence[str], limit: float) -> Ended:
     """Runs files of tests in a fork, up to the first that fails."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    child = os.fork() or _child(root, tests, limit, compiled=compiled)
+    child = os.fork() or _child(root, tests, limit)
     began, code = time.monotonic(), None
     while code is None:
         ended, status = os.waitpid(child, os.WNOHANG)
@@ -76,7 +75,7 @@ def run(root: Path, tests: Sequence[str], limit: float, *, compiled: bool) -> En
     return Ended(code, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
 
 
-def _child(root: Path, tests: Sequence[str], limit: float, *, compiled: bool) -> NoReturn:
+def _child(root: Path, tests: Sequence[str], limit: float) -> NoReturn:
     os.setsid()
     os.chdir(root)
     log = os.open(root.with_name("log"), os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
@@ -87,21 +86,7 @@ def _child(root: Path, tests: Sequence[str], limit: float, *, compiled: bool) ->
 
     for name in [each for each in sys.modules if each.partition(".")[0] in PROJECT]:
         del sys.modules[name]
-    if not compiled:
-        _uncompiled()
     os._exit(int(pytest.main(["-n0", "-x", "-q", "-p", "no:cacheprovider", *tests])))
-
-
-def _uncompiled() -> None:
-    import numba
-
-    numba.config.DISABLE_JIT = True  # type: ignore[attr-defined]
-    core, compiling = (importlib.import_module(f"sim.core{each}") for each in ("", ".compiling"))
-    for module in (core, compiling):
-        vars(module)["compiled"] = lambda function, **_: function
-    loops: dict[int, Callable[..., object]] = {}  # by what stands for an address
-    vars(core)["address_of"] = lambda loop, *_: id(loops.setdefault(id(loop), loop))
-    vars(core)["call_at"] = lambda address, _, arguments: loops[address](*arguments)
 
 
 @cache
@@ -114,7 +99,7 @@ def matching(root: Path, path: str) -> tuple[tuple[str, ...], float]:
     )
     chosen, total = [], 0.0
     for file in map(str, files):
-        seconds = _unchanged(root, file, compiled=room not in UNCOMPILED)
+        seconds = _unchanged(root, file)
         if seconds <= LONGEST and total + seconds <= BUDGET:
             chosen.append(file)
             total += seconds
@@ -122,9 +107,9 @@ def matching(root: Path, path: str) -> tuple[tuple[str, ...], float]:
 
 
 @cache
-def _unchanged(root: Path, file: str, *, compiled: bool) -> float:
+def _unchanged(root: Path, file: str) -> float:
     """Returns the seconds of CPU of a file of tests; infinitely many where it fails."""
-    ended = run(root, [file], 4 * LONGEST, compiled=compiled)
+    ended = run(root, [file], 4 * LONGEST)
     if ended.code:
         sys.stderr.write(f"left out, as it ends with {ended.code} unchanged: {file}\n")
     return float("inf") if ended.code else ended.seconds
@@ -144,7 +129,7 @@ def tried(root: Path, mutant: dict[str, str]) -> dict[str, object]:
     path.write_text(mutant["code"], encoding="utf-8")
     os.utime(path, (times.st_atime, times.st_mtime + 10))  # its bytecode is not that of before
     try:
-        ended = run(root, tests, 5 * seconds + 30, compiled=_room(mutant["path"]) not in UNCOMPILED)
+        ended = run(root, tests, 5 * seconds + 30)
     finally:
         path.write_bytes(good)
         os.utime(path, (times.st_atime, times.st_mtime))
@@ -166,7 +151,12 @@ def _change(good: str, mutated: str) -> str:
 
 def drawn(root: Path, python: str, seed: int, count: int) -> Iterator[dict[str, str]]:
     """Yields mutants of the rooms' modules as they are drawn."""
-    rooms = [path for room in ROOMS for path in sorted((root / room).rglob("*.py"))]
+    rooms = [
+        path
+        for room in ROOMS
+        for path in sorted((root / room).rglob("*"))
+        if path.suffix in (".py", ".c")
+    ]
     modules = [str(path.relative_to(root)) for path in rooms if path.name != "__init__.py"]
     command = [python, str(Path(__file__).with_name("draw.py")), str(seed), str(count), *modules]
     with subprocess.Popen(command, cwd=root, text=True, stdout=subprocess.PIPE) as drawing:
@@ -194,6 +184,7 @@ def main() -> int:
     found = []
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder, "copy")
+        os.environ["XDG_CACHE_HOME"] = str(Path(folder, "caches"))  # of mutants of C
         copied(root)
         sys.path.insert(0, str(root))
         importlib.import_module("pipeline.runtime").pin()

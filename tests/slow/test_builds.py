@@ -77,7 +77,8 @@ def test_an_installation_without_a_network(tmp_path: Path) -> None:
     """From a folder of packages, as docs/install.md tells it."""
     script = "pipeline/workflow/install_lock.py"
     (tmp_path / script).parent.mkdir(parents=True)
-    for name in ("Makefile", "requirements.lock", "requirements-dev.lock", script):
+    locks = (path.name for path in ROOT.glob("requirements*.lock"))
+    for name in ("Makefile", *locks, script):
         shutil.copy(ROOT / name, tmp_path / name)
     make(tmp_path, "wheels", "WHEELS=packages")
     make(tmp_path, "dev", "WHEELS=packages", **NOWHERE)

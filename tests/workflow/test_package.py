@@ -13,7 +13,7 @@ from pipeline.runtime import ROOT
 SAME = """
 import pickle, sys
 import metacloak
-assert "jax" not in sys.modules and "numba" not in sys.modules
+assert "jax" not in sys.modules
 import metacloak.sim.structure as installed
 from metacloak.sim.structure import Lattice
 assert installed.Lattice is Lattice
@@ -43,7 +43,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def ran(code: Path, folder: Path, *words: str) -> str:
     """Runs a command of the package, without checkout or caches; returns what it prints."""
-    hidden = ("PYTHONPATH", "NUMBA_CACHE_DIR", "JAX_COMPILATION_CACHE_DIR", "MPLCONFIGDIR")
+    hidden = ("PYTHONPATH", "JAX_COMPILATION_CACHE_DIR", "MPLCONFIGDIR")
     environment = {name: value for name, value in os.environ.items() if name not in hidden}
     environment |= {"PYTHONPATH": str(code), "XDG_CACHE_HOME": str(folder / "caches")}
     ended = subprocess.run(

@@ -9,8 +9,7 @@ import numpy as np
 
 from pipeline.runtime import Picture
 from pipeline.tracking.fit import patch_correlation
-from pipeline.tracking.fit.compared_pixels import SIZE, FramePixels, pixel_lists
-from pipeline.tracking.fit.normal_equations import fit_buffers
+from pipeline.tracking.fit.compared_pixels import FramePixels
 from pipeline.tracking.fit.patch_correlation import FitStart, PoseFits, Templates
 from pipeline.tracking.fit.template import block_places
 from pipeline.tracking.fit.template_cells import TemplateCells
@@ -69,7 +68,7 @@ class PoseFitter:
         units, place = len(pose), self.templates.centre + pose[:, :2]
         j = self.camera.jacobian(place)
         scale = np.sqrt(np.abs(j[..., 0, 0] * j[..., 1, 1] - j[..., 0, 1] * j[..., 1, 0]))
-        start = FitStart(
+        values = (
             np.concatenate([pose, photometry], axis=1),
             self.camera.project(place),
             self.templates.reach * scale * 1.03 + 1,
@@ -79,11 +78,12 @@ class PoseFitter:
             np.zeros(units) if tight is None else tight,
             np.zeros((units, 3)) if drift is None else drift,
         )
+        start = FitStart(*(np.ascontiguousarray(each, np.float64) for each in values))
         wanted = np.isfinite(start.middle[:, 0]) & np.isfinite(scale)
         wanted = wanted if chosen is None else wanted & chosen
         out = np.full((units, patch_correlation.WIDTH), np.nan)
         if wanted.any():
-            scene = FramePixels(self._as_singles(image), self.blocks)
+            scene = FramePixels(self._as_singles(image), image.shape[1], self.blocks)
             parts = _shares(wanted)
             left, others = iter(parts), min(_THREADS, len(parts)) - 1
             beside = [
@@ -114,14 +114,12 @@ class PoseFitter:
 
         Loops over pixels hold no interpreter's lock.
         """
-        across = int(2 * start.radius[wanted].max()) // SIZE + 3
-        lists = pixel_lists(across**2)
-        room = fit_buffers(len(lists.x), self.templates.weight[0].size)
+        size = self.templates.weight.shape[1]
         for part in left:
             begin = FitStart(*(values[part] for values in start))
             looks = _part_of(self.templates, part)
             patch_correlation.fit_patches(
-                scene, looks, begin, wanted[part], FULL_STEPS, lists, room, out[part]
+                scene, looks, begin, wanted[part], size, FULL_STEPS, out[part]
             )
 
 

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from scipy.ndimage import spline_filter
 
-from pipeline.runtime import Picture, compiled, inlined
+from pipeline.runtime import Picture, compiled
 from pipeline.tracking.fit.compared_pixels import SIZE
 from pipeline.tracking.fit.patch_correlation import Templates
 from pipeline.tracking.fit.template_cells import classify_templates
@@ -26,7 +26,6 @@ _REACH = 2.5
 
 _SPREAD = float(np.sqrt((SIZE**2 - 1) / 12))
 """Standard deviation of the columns, or rows, of a block's pixels."""
-_TAPS = 4
 
 
 class TemplateGrid:
@@ -111,7 +110,7 @@ def _templates(
     square = ((brightness - mean[:, None, None]) ** 2 * weight).sum(axis=(1, 2)) / total
     distance = np.hypot(grid.x, grid.y)
     reach = np.array([distance[mask > 0].max(initial=0.0) for mask in weight])
-    contrast = np.sqrt(square)
+    contrast = np.sqrt(square).astype(np.float64)
     cells = classify_templates(brightness, weight, contrast, noise)
     nodes = brightness, weight, grid.half, grid.step
     return Templates(*nodes, grid.centre, contrast, reach, noise, cells)
@@ -190,8 +189,8 @@ def learn_templates(
     for unit in range(len(grid.centre)):
         points = grid.centre[unit] + np.stack([grid.x[wanted[unit]], grid.y[wanted[unit]]], axis=1)
         x, y = camera.project(points).T
-        value = np.empty(len(points))
-        sample_spline(coefs, np.ascontiguousarray(x), np.ascontiguousarray(y), value)
+        value, columns = np.empty(len(points)), coefs.shape[1]
+        sample_spline(coefs, columns, np.ascontiguousarray(x), np.ascontiguousarray(y), value)
         face[unit, wanted[unit]] = value
     seen = np.isfinite(face)
     weight = np.where(
@@ -227,37 +226,8 @@ def spline_coefficients(values: Floats) -> Singles:
     return np.asarray(spline_filter(values, order=3, mode="mirror", output=np.float64), np.float32)
 
 
-@inlined
-def spline_weights(offset: float, value: Floats, slope: Floats) -> None:
-    """Fills the four basis values and slopes at ``offset`` in [0, 1) behind the second knot."""
-    rest = 1.0 - offset
-    square, rest_square = offset * offset, rest * rest
-    value[0] = rest_square * rest / 6
-    value[1] = 2 / 3 - 0.5 * square * (2 - offset)
-    value[2] = 2 / 3 - 0.5 * rest_square * (2 - rest)
-    value[3] = square * offset / 6
-    slope[0] = -0.5 * rest_square
-    slope[1] = 1.5 * square - 2 * offset
-    slope[2] = 2 * rest - 1.5 * rest_square
-    slope[3] = 0.5 * square
-
-
 @compiled
-def sample_spline(coefs: Singles, x: Floats, y: Floats, out: Floats) -> None:
+def sample_spline(
+    coefs: Singles, columns: int, x: Floats, y: Floats, out: Floats, n_coefs: int = 0, n_x: int = 0
+) -> None:
     """Samples at points (column ``x``, row ``y``); NaN where the four by four knots do not fit."""
-    rows, columns = coefs.shape
-    wx, wy, slope = np.empty(_TAPS), np.empty(_TAPS), np.empty(_TAPS)
-    for k in range(x.size):
-        column, row = int(np.floor(x[k])), int(np.floor(y[k]))
-        if column < 1 or row < 1 or column > columns - 3 or row > rows - 3:
-            out[k] = np.nan
-            continue
-        spline_weights(x[k] - column, wx, slope)
-        spline_weights(y[k] - row, wy, slope)
-        total = 0.0
-        for a in range(_TAPS):
-            line = 0.0
-            for b in range(_TAPS):
-                line += wx[b] * coefs[row - 1 + a, column - 1 + b]
-            total += wy[a] * line
-        out[k] = total

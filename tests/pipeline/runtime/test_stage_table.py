@@ -12,7 +12,7 @@ from pipeline.problem import Problem
 from pipeline.runtime import ROOT, STAGES, Stage
 from pipeline.runtime.cli import command_line
 
-HEAVY = ("jax", "numba", "numpy", "pydantic", "xarray", "yaml", "cv2", "matplotlib")
+HEAVY = ("jax", "numpy", "pydantic", "xarray", "yaml", "cv2", "matplotlib")
 
 
 @pytest.mark.parametrize("stage", STAGES.values(), ids=lambda stage: stage.name)

@@ -30,6 +30,7 @@ from sim.energy import (
     topology,
 )
 from sim.energy.distance_contact import barrier, edge_energy, vertices_energy
+from sim.energy.network_arrays import Kinematics
 from sim.linalg import clear, matrix, number_free_dofs
 from sim.structure import clearance, displaced
 from sim.structure.gaps import polygons
@@ -177,8 +178,10 @@ def test_mixed_derivatives(case: Crowd) -> None:
     out = Sensitivity(
         zero, zero, zero, zero, zero, np.zeros(1), np.zeros_like(contacts.corner), np.zeros((4, 2))
     )
-    turn = np.stack([np.cos(motion[2::3]), np.sin(motion[2::3])], axis=1)
-    distance_contact_kernels.add_mixed(motion, contacts, turn, direction, out)
+    turn = motion[2::3]
+    parts = [np.cos(turn), np.sin(turn), np.cos(turn / 2), np.sin(turn / 2)]
+    kinematics = Kinematics(np.stack(parts, axis=1), zero)
+    distance_contact_kernels.add_mixed(motion, contacts, kinematics, direction, out)
 
     wanted = mixed_of_definition(motion, numbers(case), direction)
     assert_equal(out.corner, wanted.corner)

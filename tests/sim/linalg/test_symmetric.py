@@ -8,6 +8,7 @@ from sim.linalg import (
     OF_EQUILIBRIA,
     OF_MOTIONS,
     Matrix,
+    Pattern,
     Storage,
     add,
     banded,
@@ -18,6 +19,8 @@ from sim.linalg import (
     number_free_dofs,
     solve,
 )
+from sim.linalg.nested_dissection import no_fronts
+from sim.linalg.panels import no_panels
 from sim.linalg.symmetric import seconds
 from tests.sim.structures import dense, mixed_polygons, rotating_squares
 
@@ -87,9 +90,10 @@ def test_nan_is_not_positive_definite(storage: Storage, place: int) -> None:
 def test_nan_in_a_band_of_any_width_is_noticed(width: int, place: tuple[int, int]) -> None:
     band = np.zeros((150, width + 1))
     band[:, 0], band[:, 1] = 10.0, -1.0
-    assert banded.factorise(band.copy())
+    pattern = Pattern(np.array([150, width]), no_fronts(), no_panels())
+    assert factorise(Matrix(band.copy(), np.empty(0), pattern))
     band[place] = np.nan
-    assert not banded.factorise(band)
+    assert not factorise(Matrix(band, np.empty(0), pattern))
 
 
 @pytest.mark.parametrize("storage", STORAGES)

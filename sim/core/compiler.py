@@ -1,0 +1,145 @@
+"""Compiles a folder's files of C, once on a machine, and loads them.
+
+What is compiled lies among the user's caches under a hash of all that it is made of, so that each
+checkout, script and process finds it.
+"""
+
+import ctypes
+import errno
+import fcntl
+import hashlib
+import logging
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
+
+import platformdirs
+
+from sim.core import compile_time
+from sim.core.instruction_set import LEVEL, can_pin
+from sim.core.temporary_folder import make_temporary_folder
+
+LOG = logging.getLogger(__name__)
+
+_FLAGS = (
+    *("-std=c11", "-O3", "-fPIC", "-shared"),
+    # the same bits by every compiler: no fused products, no other order of sums
+    *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
+)
+
+_FULL = "No space left on device", "Disk quota exceeded"
+
+
+class CompilerError(RuntimeError):
+    """Reports that what is in C cannot be compiled."""
+
+    remedy = (
+        "install a compiler: `apt install gcc`, `dnf install gcc`, `xcode-select --install`, or"
+        " `pip install ziglang`; CC names another"
+    )
+
+
+def load(folder: Path, flags: tuple[str, ...] = ()) -> ctypes.CDLL:
+    """Loads the library of a folder, compiled before or now, with `flags` besides those of all.
+
+    Raises:
+        CompilerError: there is no compiler, it fails, or what it makes cannot be kept.
+    """
+    asked = [*options(), *flags]
+    name = f"{folder.name}-{_digest(folder, asked)}.so"
+    failures: list[str] = []
+    for place in cache_folders():
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+            return _load(folder, place / name, asked)
+        except OSError as error:  # not to be written, or no code may be run from there
+            failures.append(str(error))
+    raise CompilerError(f"what is compiled can be kept nowhere: {'; '.join(failures)}")
+
+
+def sources(folder: Path) -> list[Path]:
+    """Lists a folder's files of C, headers among them."""
+    return sorted([*folder.rglob("*.c"), *folder.rglob("*.h")])
+
+
+def cache_folders() -> Iterator[Path]:
+    """Lists the folder of what is compiled and, where that cannot be used, one for a while."""
+    yield platformdirs.user_cache_path("metacloak") / "compiled"
+    with suppress(OSError):
+        yield make_temporary_folder() / "compiled"
+
+
+def _load(folder: Path, library: Path, asked: list[str]) -> ctypes.CDLL:
+    """Loads a library from its place, where it is compiled if it is not there or is damaged."""
+    if library.exists():
+        with suppress(OSError):
+            return ctypes.CDLL(str(library))
+    with compile_time.counted(), library.with_suffix(".lock").open("w") as turn:
+        with suppress(OSError):  # some file systems know no locks: then more than one compile it
+            fcntl.flock(turn, fcntl.LOCK_EX)
+        if library.exists():  # another process has compiled it meanwhile
+            with suppress(OSError):
+                return ctypes.CDLL(str(library))
+        LOG.info("compiling %s, once on this machine: some seconds", folder.name)
+        with tempfile.TemporaryDirectory(dir=library.parent) as beside:
+            made = Path(beside) / library.name
+            _compile(folder, made, asked)
+            made.replace(library)
+    return ctypes.CDLL(str(library))
+
+
+def _compile(folder: Path, library: Path, asked: list[str]) -> None:
+    files = [str(path) for path in sources(folder) if path.suffix == ".c"]
+    chosen = compiler()
+    if "ziglang" in chosen:  # which spells processors in its own way
+        asked = [each.replace(LEVEL, LEVEL.replace("-", "_")) for each in asked]
+    command = [*chosen, *asked, f"-I{folder.parent}", "-o", str(library), *files, "-lm"]
+    try:
+        ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    except OSError as error:
+        raise CompilerError(f"{chosen[0]} cannot be run: {error.strerror}") from error
+    if any(words in ended.stderr for words in _FULL):
+        raise OSError(errno.ENOSPC, f"{library.parent} is full")
+    if ended.returncode:
+        raise CompilerError(f"{shlex.join(command)}\n{ended.stderr.strip()}")
+
+
+def compiler() -> list[str]:
+    """Finds a compiler of C: CC, one on the path, or the one of the package ziglang.
+
+    Raises:
+        CompilerError: there is none.
+    """
+    named = shlex.split(os.environ.get("CC", ""))
+    if named:
+        return named
+    for name in ("cc", "gcc", "clang"):
+        if shutil.which(name):
+            return [name]
+    if find_spec("ziglang"):
+        return [sys.executable, "-m", "ziglang", "cc"]
+    raise CompilerError("no compiler of C is found")
+
+
+def options() -> list[str]:
+    """Lists the compiler's options; those of METACLOAK_CFLAGS come last."""
+    level = [f"-march={LEVEL}"] if can_pin() else []
+    return [*_FLAGS, *level, *shlex.split(os.environ.get("METACLOAK_CFLAGS", ""))]
+
+
+def _digest(folder: Path, asked: list[str]) -> str:
+    """Hashes all that a library is made of."""
+    made_for = (platform.system(), platform.machine(), *platform.libc_ver())
+    digest = hashlib.sha256(" ".join([*asked, *made_for]).encode())
+    for path in sources(folder):
+        content = path.read_bytes()
+        digest.update(f"{path.relative_to(folder)} {len(content)}\n".encode() + content)
+    return digest.hexdigest()[:16]

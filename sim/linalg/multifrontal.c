@@ -1,0 +1,82 @@
+/* Factorises and solves by the fronts of a nested dissection. */
+#include "sim/linalg/lapack.h"
+#include "sim/linalg/linalg.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+int64_t multifrontal_entry(const Fronts *f, int64_t row, int64_t column) {
+    int64_t front = f->owner[column];
+    int64_t first = f->first[front], end = f->first[front + 1];
+    int64_t low = f->edge[front], high = f->edge[front + 1];
+    int64_t start = f->panel[front] + (column - first) * (end - first + high - low);
+    if (row < end) return start + row - first;
+    int64_t here = low;
+    while (low < high) {  /* the row is in the boundary, which ascends */
+        int64_t middle = (low + high) / 2;
+        if (f->boundary[middle] < row)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return start + end - first + low - here;
+}
+
+/* Adds what a child left to the matrix of its parent: own columns, then the boundary's. */
+static void add_child(
+    int64_t child, int64_t k, int64_t b, double *panel, double *block, const double *scratch,
+    const Fronts *f) {
+    const int64_t *place = f->place + f->edge[child];
+    int64_t n = f->edge[child + 1] - f->edge[child];
+    const double *left = scratch + f->update[child];
+    for (int64_t j = 0; j < n; j++) {
+        const double *source = left + j * n;
+        double *target = place[j] < k ? panel + place[j] * (k + b) : block + (place[j] - k) * b - k;
+        for (int64_t i = j; i < n; i++) target[place[i]] += source[i];
+    }
+}
+
+bool multifrontal_factorise(double *values, double *scratch, const Fronts *f) {
+    double plus = 1.0, minus = -1.0;
+    for (int64_t front = 0; front < f->n_update; front++) {
+        int64_t k = f->first[front + 1] - f->first[front], b = f->edge[front + 1] - f->edge[front];
+        double *panel = values + f->panel[front], *block = scratch + f->update[front];
+        memset(block, 0, sizeof(double) * b * b);
+        for (int64_t c = f->child[front]; c < f->child[front + 1]; c++)
+            add_child(f->children[c], k, b, panel, block, scratch, f);
+        int own = k, rest = b, whole = k + b, info = 0;
+        dpotrf("L", &own, panel, &whole, &info);
+        if (info != 0 || !isfinite(panel[(k - 1) * (k + b) + k - 1])) return false;
+        if (b == 0) continue;
+        double *below = panel + k;
+        dtrsm("R", "L", "T", "N", &rest, &own, &plus, panel, &whole, below, &whole);
+        dsyrk("L", "N", &rest, &own, &minus, below, &whole, &plus, block, &rest);
+    }
+    return true;
+}
+
+void multifrontal_solve(const double *values, const Fronts *f, int64_t n, double *right) {
+    double plus = 1.0, minus = -1.0, none = 0.0, *gathered = malloc(sizeof(double) * n);
+    int unit = 1;
+    for (int64_t turn = 0; turn < 2 * f->n_update; turn++) {
+        bool down = turn < f->n_update;
+        int64_t front = down ? turn : 2 * f->n_update - 1 - turn;
+        int64_t first = f->first[front], end = f->first[front + 1];
+        const int64_t *rows = f->boundary + f->edge[front];
+        int rest = f->edge[front + 1] - f->edge[front], own = end - first, whole = own + rest;
+        double *panel = (double *)values + f->panel[front], *below = panel + own, *x = right + first;
+        if (down) {
+            dtrsv("L", "N", "N", &own, panel, &whole, x, &unit);
+            if (rest)
+                dgemv("N", &rest, &own, &plus, below, &whole, x, &unit, &none, gathered, &unit);
+            for (int i = 0; i < rest; i++) right[rows[i]] -= gathered[i];
+        } else {
+            for (int i = 0; i < rest; i++) gathered[i] = right[rows[i]];
+            if (rest)
+                dgemv("T", &rest, &own, &minus, below, &whole, gathered, &unit, &plus, x, &unit);
+            dtrsv("L", "T", "N", &own, panel, &whole, x, &unit);
+        }
+    }
+    free(gathered);
+}

@@ -1,0 +1,85 @@
+/* Follows equilibrium paths: Newton's method, increments, ends of paths, damped motion to rest. */
+#ifndef SIM_QUASISTATICS_H
+#define SIM_QUASISTATICS_H
+
+#include "sim/core/numbers.h"
+#include "sim/declarations.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Part of the way to a barrier that a step may go. */
+static const double KEEP_FROM_BARRIER = 0.9;
+/* Least relative change of an eigenvalue that iterations go on for. */
+static const double EIGENVALUE = 1e-6;
+/* Least part of the way to a load that an increment may be. */
+static const double SMALLEST_INCREMENT = 1e-8;
+
+/* Places in the counts that the solvers gather, as in newton.py. */
+enum { GRADIENTS, FACTORS, SHIFTED, INCREMENTS };
+/* Places in the pace of a path, as in increments.py. */
+enum { INCREMENT, VALUE, RATE, FIRST };
+/* How a way went on, as in path_ends.py. */
+enum { SMOOTH, LIMIT_POINT, BRANCHING };
+/* Snaps of a path that are recorded, as in equilibrium_path.py. */
+enum { MOST_SNAPS = 64 };
+/* Sweeps of the inverse iteration at a load. */
+enum { SWEEPS_AT_LOADS = 40 };
+
+static inline bool met_new_units(const System *s) {
+    return s->contacts.n_pairs > 0 && s->contacts.cache.found[1] > 0;
+}
+
+/* Length of a step in some dofs, rotations times the scale, mm. */
+static inline double length_of(const double *step, const int64_t *dofs, int64_t n, const System *s) {
+    double total = 0.0;
+    EACH(i, n) total += square(step[dofs[i]] * s->scale[dofs[i]]);
+    return sqrt(total);
+}
+
+/* Tolerance of the residual over the largest reaction, its floor, N, and the viscous drag of each
+   dof in the motion after a snap. */
+typedef struct {
+    double relative, absolute;
+    double *drag;
+} Tolerance;
+
+/* Energy, and the largest out-of-balance and reaction force (moments over the scale), N. */
+typedef struct {
+    double energy, residual, reaction;
+} Balance;
+
+Balance newton_balance_of(double *motion, const System *s, const Workspace *w);
+double newton_median_stiffness(const System *s);
+double newton_factorise_shifted(
+    double *motion, const System *s, const Workspace *w, int64_t *counts);
+void newton_solve_free(const System *s, const Workspace *w);
+bool newton_correct(
+    double *motion, const Tolerance *t, bool shifted, const System *s, const Workspace *w,
+    int64_t *counts);
+
+double snap_lowest_mode(
+    const System *s, const Workspace *w, double *mode, int sweeps, double tolerance);
+void snap_push(double *motion, double *mode, double sense, const System *s, const Workspace *w);
+bool snap_follow_to_rest(
+    double *motion, const Tolerance *t, const System *s, const Workspace *w, int64_t *counts);
+
+void increments_tangent_step(double *motion, const System *s, const Workspace *w);
+void increments_aim(
+    double *motion, double *load, double share, const System *s, const Workspace *w);
+double increments_crookedness(
+    double *motion, double *predicted, const System *s, const Workspace *w);
+double increments_next(double increment, double left, double way, const double *pace);
+double increments_step_ahead(
+    double *motion, double *load, double share, double *predicted, const System *s,
+    const Workspace *w, int64_t *counts);
+
+void path_ends_scatter(double *mode, int64_t n);
+double path_ends_leave(
+    double *motion, double *load, double ahead, double *mode, double sense, double first,
+    const Tolerance *t, const System *s, const Workspace *w, int64_t *counts, int *end);
+double path_ends_come_to_rest(
+    double *motion, double *mode, double sense, const Tolerance *t, const System *s,
+    const Workspace *w, int64_t *counts, int *end);
+
+#endif

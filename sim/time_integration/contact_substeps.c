@@ -1,0 +1,252 @@
+/* Moves the units between two kicks, with contact on void angles, and back.
+
+   Units fly straight on but where a void is closed to its cutoff: there the barrier turns them
+   back, the faster the deeper they are. This part of the motion is local and needs no ligament's
+   force, so the rotations of those units take finer steps of the same splitting, as many as the
+   depth asks for that their energy can carry them to. The steps of all else need not follow the
+   barrier. */
+#include "sim/time_integration/time_integration.h"
+
+#include <stdlib.h>
+
+/* Voids that may come as near as this (2 degrees) to their cutoff during a flight are followed in
+   it. */
+static const double MARGIN = 0.03490658503988659;
+/* Stiffness of voids that share units, over that of one alone. */
+static const double SHARED = 2.0;
+/* Finer steps of one flight at most. */
+enum { MOST = 4096 };
+
+Flight contact_substeps_flight_of(const int64_t *watched, int64_t n_watched, int64_t n_units) {
+    int64_t *near = calloc(n_watched + 2 * n_units, sizeof(int64_t));
+    double *angle = calloc(4 * n_units, sizeof(double));
+    return (Flight){
+        .watched = watched, .n_watched = n_watched, .near = near, .units = near + n_watched,
+        .met = near + n_watched + n_units, .angle = angle, .rate = angle + n_units,
+        .force = angle + 2 * n_units, .pull = angle + 3 * n_units};
+}
+
+void contact_substeps_free(Flight *flight) {
+    free(flight->near);
+    free(flight->angle);
+}
+
+/* The dofs of the rotations of the two units that a ligament joins, and these. */
+typedef struct {
+    int64_t a, b, turn_a, turn_b;
+} Joined;
+
+static inline Joined joined_by(const System *system, int64_t k) {
+    int64_t a = system->net.unit[2 * k], b = system->net.unit[2 * k + 1];
+    return (Joined){a, b, 3 * a + 2, 3 * b + 2};
+}
+
+/* Energy of one void and its first two derivatives by the turn. */
+typedef struct {
+    double energy, slope, curvature;
+} Slopes;
+
+static inline Slopes slopes_of(const System *system, int64_t k, int64_t side, double turn) {
+    double found[3];
+    void_contact_kernels_void_slopes(&system->net, k, side, turn, found);
+    return (Slopes){found[0], found[1], found[2]};
+}
+
+/* Notes a unit beside a void that may come to contact, once, and where it is. */
+static void meet(int64_t unit, const double *u, const double *v, Flight *flight) {
+    if (flight->met[unit]) return;
+    flight->met[unit] = 1;
+    flight->units[flight->n_units++] = unit;
+    flight->angle[unit] = u[3 * unit + 2];
+    flight->rate[unit] = v[3 * unit + 2];
+}
+
+/* Notes the voids that may come to contact within `tau`, and the units beside them. */
+static void find(
+    double tau, const double *u, const double *v, const System *system, Flight *flight) {
+    const NetworkArrays *net = &system->net;
+    EACH(i, flight->n_units) flight->met[flight->units[i]] = 0;
+    flight->n_near = flight->n_units = 0;
+    EACH(i, flight->n_watched) {
+        int64_t k = flight->watched[i];
+        Joined by = joined_by(system, k);
+        double turn = u[by.turn_a] - u[by.turn_b];
+        double turning = tau * (v[by.turn_a] - v[by.turn_b]);
+        double one = net->void_[2 * k] + turn + least(turning, 0.0);
+        double other = net->void_[2 * k + 1] - turn - most(turning, 0.0);
+        if (least(one, other) < net->contact[3 * k + 2] + MARGIN) {
+            flight->near[flight->n_near++] = k;
+            meet(by.a, u, v, flight);
+            meet(by.b, u, v, flight);
+        }
+    }
+}
+
+/* Reciprocal rotational inertia of a unit, zero if its rotation is held. */
+static inline double agility_of(int64_t unit, const System *system) {
+    int64_t d = 3 * unit + 2;
+    return system->free[d] >= 0 ? 1.0 / system->mass[d] : 0.0;
+}
+
+/* Curvature of a void's barrier where all of an energy is in it. */
+static double curvature_at(double energy, const double *law) {
+    double stiffness = law[0], barrier = law[1], cutoff = law[2];
+    double scale = 0.5 * stiffness * square(cutoff - barrier);
+    double rest = scale / (scale + energy);
+    return 0.5 * stiffness * (8.0 - 6.0 * rest) / (rest * (rest * rest));
+}
+
+/* Counts the finer steps that follow the barrier where the energy of each void can carry it. */
+static int64_t finer_steps(
+    double tau, const Pace *pace, const System *system, const Flight *flight) {
+    double fastest = 0.0;
+    EACH(i, flight->n_near) {
+        int64_t k = flight->near[i];
+        Joined by = joined_by(system, k);
+        double agility = agility_of(by.a, system) + agility_of(by.b, system);
+        if (agility > 0.0) {
+            double turn = flight->angle[by.a] - flight->angle[by.b];
+            double rate = flight->rate[by.a] - flight->rate[by.b];
+            double energy = 0.5 * rate * rate / agility;
+            EACH(side, 2) energy += slopes_of(system, k, side, turn).energy;
+            double curvature = curvature_at(energy, system->net.contact + 3 * k);
+            fastest = most(fastest, SHARED * curvature * agility);
+        }
+    }
+    double steps = fabs(tau) * sqrt(fastest) / pace->reach;
+    return steps <= MOST ? (int64_t)ceil(most(steps, 1.0)) : MOST + 1;
+}
+
+/* Fills the moments of the barriers on the units that meet; tells whether none is passed. */
+static bool fill_moments(const double *u, const System *system, Flight *flight) {
+    EACH(i, flight->n_units) flight->force[flight->units[i]] = 0.0;
+    EACH(i, flight->n_near) {
+        int64_t k = flight->near[i];
+        Joined by = joined_by(system, k);
+        EACH(side, 2) {
+            Slopes of = slopes_of(system, k, side, u[by.turn_a] - u[by.turn_b]);
+            if (!(of.energy < INFINITY)) return false;
+            flight->force[by.a] += of.slope;
+            flight->force[by.b] -= of.slope;
+        }
+    }
+    return true;
+}
+
+static void turn_on(double tau, double *u, const double *v, const Flight *flight) {
+    EACH(i, flight->n_units) {
+        int64_t d = 3 * flight->units[i] + 2;
+        u[d] += tau * v[d];
+    }
+}
+
+static void push(double tau, double *v, const System *system, const Flight *flight) {
+    EACH(i, flight->n_units) {
+        int64_t unit = flight->units[i];
+        v[3 * unit + 2] -= tau * agility_of(unit, system) * flight->force[unit];
+    }
+}
+
+/* Takes the units that meet through n finer steps; tells whether no barrier is passed. */
+static bool bounce(
+    double tau, int64_t n, double *u, double *v, const Pace *pace, const System *system,
+    Flight *flight) {
+    EACH(i, flight->n_units) {
+        int64_t unit = flight->units[i];
+        u[3 * unit + 2] = flight->angle[unit];
+        v[3 * unit + 2] = flight->rate[unit];
+    }
+    double delta = tau / n;
+    EACH(step, n) {
+        EACH(m, pace->n_kicks) {
+            turn_on(pace->drifts[m] * delta, u, v, flight);
+            if (!fill_moments(u, system, flight)) return false;
+            push(pace->kicks[m] * delta, v, system, flight);
+        }
+        turn_on(pace->drifts[pace->n_drifts - 1] * delta, u, v, flight);
+    }
+    return true;
+}
+
+int64_t contact_substeps_fly(
+    double tau, double *u, double *v, const Pace *pace, const System *system, Flight *flight) {
+    find(tau, u, v, system, flight);
+    EACH(i, system->n_dofs) u[system->dofs[i]] += tau * v[system->dofs[i]];
+    if (flight->n_near == 0) return 0;
+    for (int64_t n = finer_steps(tau, pace, system, flight); n <= MOST; n *= 2)
+        if (bounce(tau, n, u, v, pace, system, flight)) return n;
+    return -1;
+}
+
+/* Reverse of `push` at the moments held in the flight. */
+static void pull(
+    double weight, const double *u, double *bar_u, const double *bar_v, const System *system,
+    const Flight *flight, const Bars *bars) {
+    const Sensitivity *out = &bars->sensitivity;
+    EACH(i, flight->n_units) {
+        int64_t unit = flight->units[i], d = 3 * unit + 2;
+        double agility = agility_of(unit, system);
+        bars->mass[d] += weight * agility * agility * flight->force[unit] * bar_v[d];
+    }
+    EACH(i, flight->n_near) {
+        int64_t k = flight->near[i];
+        Joined by = joined_by(system, k);
+        double turning = -weight * (
+            agility_of(by.a, system) * bar_v[by.turn_a]
+            - agility_of(by.b, system) * bar_v[by.turn_b]);
+        EACH(side, 2) {
+            Slopes of = slopes_of(system, k, side, u[by.turn_a] - u[by.turn_b]);
+            double moment = of.curvature * turning;
+            out->void_[2 * k + side] += (1.0 - 2.0 * side) * moment;
+            out->contact[k] += of.slope / system->net.contact[3 * k] * turning;
+            bar_u[by.turn_a] += moment;
+            bar_u[by.turn_b] -= moment;
+        }
+    }
+}
+
+/* Reverse of `turn_on`. */
+static void turn_back(
+    double drift, double *u, const double *v, const double *bar_u, double *bar_v,
+    const System *system, const Flight *flight) {
+    EACH(i, flight->n_units) {
+        int64_t d = 3 * flight->units[i] + 2;
+        if (system->free[d] >= 0) bar_v[d] += drift * bar_u[d];
+    }
+    turn_on(-drift, u, v, flight);
+}
+
+/* Reverse of `bounce` from its end; the states come back as they went, to rounding. */
+static void bounce_back(
+    double tau, int64_t n, double *u, double *v, double *bar_u, double *bar_v, const Pace *pace,
+    const System *system, Flight *flight, const Bars *bars) {
+    double delta = tau / n;
+    EACH(step, n) for (int64_t m = pace->n_kicks; m >= 0; m--) {
+        turn_back(pace->drifts[m] * delta, u, v, bar_u, bar_v, system, flight);
+        if (m > 0) {
+            double kick = pace->kicks[m - 1] * delta;
+            fill_moments(u, system, flight);
+            push(-kick, v, system, flight);
+            pull(kick, u, bar_u, bar_v, system, flight, bars);
+        }
+    }
+}
+
+void contact_substeps_fly_back(
+    double tau, double *u, double *v, double *bar_u, double *bar_v, const Pace *pace,
+    const System *system, Flight *flight, const Bars *bars) {
+    int64_t n = contact_substeps_fly(tau, u, v, pace, system, flight);
+    EACH(i, flight->n_units) {
+        int64_t d = 3 * flight->units[i] + 2;
+        if (system->free[d] < 0) bar_u[d] = 0.0;
+    }
+    EACH(i, system->n_dofs) {
+        int64_t d = system->dofs[i];
+        if (n == 0 || d % 3 != 2 || !flight->met[d / 3]) bar_v[d] += tau * bar_u[d];
+    }
+    if (n > 0) bounce_back(tau, n, u, v, bar_u, bar_v, pace, system, flight, bars);
+    EACH(i, flight->n_units) {
+        int64_t unit = flight->units[i], d = 3 * unit + 2;
+        if (system->free[d] < 0) flight->pull[unit] = bar_u[d];
+    }
+}

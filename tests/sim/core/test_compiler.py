@@ -1,0 +1,160 @@
+"""What is in C is compiled once on a machine, and anew after any edit of it."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from pipeline.runtime import ROOT
+from sim.core import TEMPORARY_NAME, compiler
+
+DOUBLE = '#include "loops/times.h"\n\nlong doubled(long n) { return TIMES * n; }\n'
+TIMES = "#define TIMES 2\n"
+ASK = """
+import logging, sys
+from pathlib import Path
+from sim.core import compiler
+logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(message)s")
+print(compiler.load(Path(sys.argv[1])).doubled(7))
+"""
+
+
+def loops(folder: Path) -> Path:
+    """Writes a folder of C."""
+    made = folder / "loops"
+    made.mkdir(parents=True)
+    (made / "double.c").write_text(DOUBLE)
+    (made / "times.h").write_text(TIMES)
+    return made
+
+
+def ask(folder: Path, cache: Path, **places: str) -> subprocess.Popen[str]:
+    """Starts a process that prints what the loop makes of 7."""
+    named = {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(cache)} | places
+    return subprocess.Popen(
+        [sys.executable, "-c", ASK, str(folder)], env=os.environ | named, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+def told(folder: Path, cache: Path, **places: str) -> tuple[str, bool]:
+    """Returns that, and whether it was compiled for it."""
+    asking = ask(folder, cache, **places)
+    out, words = asking.communicate(timeout=120)
+    assert asking.returncode == 0, words
+    return out.strip(), "compiling loops" in words
+
+
+def test_another_checkout_compiles_nothing_and_an_edited_file_does(tmp_path: Path) -> None:
+    cache, first, second = tmp_path / "cache", loops(tmp_path / "one"), loops(tmp_path / "other")
+    assert told(first, cache) == ("14", True)
+    assert told(first, cache) == ("14", False)
+    assert told(second, cache) == ("14", False)
+    (second / "times.h").write_text("#define TIMES 3\n")
+    assert told(second, cache) == ("21", True)
+    assert told(first, cache) == ("14", False)
+
+
+def test_processes_that_want_it_at_once_compile_it_once(tmp_path: Path) -> None:
+    folder = loops(tmp_path)
+    asking = [ask(folder, tmp_path / "cache") for _ in range(3)]
+    words = [each.communicate(timeout=120) for each in asking]
+    assert [out.strip() for out, _ in words] == ["14"] * 3
+    assert sum("compiling loops" in err for _, err in words) == 1
+
+
+def test_a_folder_that_cannot_be_written_is_replaced_by_one_for_temporary_files(
+    tmp_path: Path,
+) -> None:
+    folder, spare = loops(tmp_path), tmp_path / "spare"
+    spare.mkdir()
+    nowhere = folder / "double.c" / "none"
+    assert told(folder, nowhere, TMPDIR=str(spare)) == ("14", True)
+    assert told(folder, nowhere, TMPDIR=str(spare)) == ("14", False)
+
+
+def test_code_that_others_may_have_written_is_not_run(tmp_path: Path) -> None:
+    folder, own = loops(tmp_path), tmp_path / "spare" / TEMPORARY_NAME
+    own.mkdir(parents=True)
+    own.chmod(0o777)
+    asking = ask(folder, folder / "double.c" / "none", TMPDIR=str(own.parent))
+    _, words = asking.communicate(timeout=120)
+    assert asking.returncode == 1
+    assert "what is compiled can be kept nowhere" in words
+    assert not list(own.rglob("*.so"))
+
+
+def test_a_damaged_file_is_compiled_again(tmp_path: Path) -> None:
+    folder, cache = loops(tmp_path), tmp_path / "cache"
+    told(folder, cache)
+    (library,) = cache.rglob("*.so")
+    library.write_bytes(library.read_bytes()[:100])
+    assert told(folder, cache) == ("14", True)
+    assert told(folder, cache) == ("14", False)
+
+
+def test_without_a_compiler_the_remedy_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(compiler, "find_spec", lambda _: None)
+    with pytest.raises(compiler.CompilerError, match="no compiler of C is found") as refused:
+        compiler.compiler()
+    assert "apt install gcc" in refused.value.remedy
+
+
+def test_the_compiler_of_the_user_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "ccache gcc")
+    assert compiler.compiler() == ["ccache", "gcc"]
+
+
+def test_a_compiler_that_is_not_there_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("CC", "no_such_compiler")
+    with pytest.raises(compiler.CompilerError, match="no_such_compiler cannot be run"):
+        compiler.load(loops(tmp_path))
+
+
+def test_a_full_disk_is_left_for_a_folder_for_temporary_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    full = tmp_path / "full"
+    full.write_text(
+        f'#!/bin/sh\ncase "$*" in *{tmp_path}/cache*)\n'
+        'echo "ld: No space left on device" >&2; exit 1;; esac\nexec cc "$@"\n'
+    )
+    full.chmod(0o700)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setenv("CC", str(full))
+    assert compiler.load(loops(tmp_path)).doubled(7) == 14
+    assert not list((tmp_path / "cache").rglob("*.so"))
+
+
+def test_faults_of_the_source_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = loops(tmp_path)
+    (folder / "double.c").write_text("long doubled(long n) { return many; }\n")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    with pytest.raises(compiler.CompilerError, match=r"double.c:1:.*many"):
+        compiler.load(folder)
+    assert not list((tmp_path / "cache").rglob("*.so"))
+
+
+def test_all_of_c_compiles_without_a_warning() -> None:
+    if not shutil.which("gcc"):
+        pytest.skip("these warnings are gcc's")
+    for folder in (ROOT / "sim", ROOT / "pipeline"):
+        files = [str(path) for path in compiler.sources(folder) if path.suffix == ".c"]
+        command = ["gcc", "-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", f"-I{ROOT}"]
+        done = subprocess.run(
+            [*command, "-fsyntax-only", *files], capture_output=True, text=True, check=False
+        )
+        assert not done.returncode, done.stderr
