@@ -5,6 +5,7 @@ from .compared_quantities import middle_units as middle_units
 from .comparison_dataset import Compared as Compared
 from .comparison_dataset import assemble_comparison as assemble_comparison
 from .comparison_dataset import describe_comparison as describe_comparison
+from .measured_side import often_seen as often_seen
 from .measured_side import prepare_measurement as prepare_measurement
 from .measured_side import select_frames as select_frames
 from .nominal_side import drive_direction as drive_direction

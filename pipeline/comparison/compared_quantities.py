@@ -30,7 +30,7 @@ class Quantity(NamedTuple):
 
 
 def list_quantities(
-    asked: Problem, response: xr.Dataset, time: Floats, inside: Mask
+    asked: Problem, response: xr.Dataset, time: Floats, seen: Mask
 ) -> dict[str, Quantity]:
     """Lists the quantities by name; without an intact structure there is nothing to mimic.
 
@@ -38,10 +38,12 @@ def list_quantities(
         asked: the problem.
         response: of all structures under the load case of the recording.
         time: (frames,) of the response at the frames, s; NaN where it has none.
-        inside: (n_units,) those that are compared in the region of interest.
+        seen: (n_units,) those that count where they are of interest, held and driven ones too.
     """
-    units = np.flatnonzero(inside)
-    low, high = (middle_units(asked, side) for side in ("bottom", "top"))
+    units = np.flatnonzero(seen & (response["roi"].values == 1))
+    low, high = (
+        [unit for unit in middle_units(asked, side) if seen[unit]] for side in ("bottom", "top")
+    )
     nearer, rows = partial(mean_approach, lower=len(low)), np.array([*low, *high])
     found = {
         "mean_rotation": Quantity(mean_rotation, units),

@@ -166,5 +166,9 @@ def _roles(design: xr.Dataset) -> NDArray[np.int8]:
 
 def _lose(motion: Floats, role: NDArray[np.int8]) -> NDArray[np.int8]:
     """Marks as lost those that would be compared but for being seldom seen."""
-    seldom = np.isfinite(motion).all(axis=2).mean(axis=0) < _SEEN
-    return np.where((role == COMPARED) & seldom, LOST, role).astype(np.int8)
+    return np.where((role == COMPARED) & ~often_seen(motion), LOST, role).astype(np.int8)
+
+
+def often_seen(motion: Floats) -> Mask:
+    """Tells the units (units,) whose motion (frames, units, 3) is known in enough of the frames."""
+    return np.asarray(np.isfinite(motion).all(axis=2).mean(axis=0) >= _SEEN)

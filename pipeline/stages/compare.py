@@ -16,6 +16,7 @@ from pipeline.comparison import (
     find_axis,
     interpolate_response,
     list_quantities,
+    often_seen,
     pixel_size,
     prepare_measurement,
     select_frames,
@@ -81,7 +82,7 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     kept = select_frames(axis.time, 1 / frequency)
     measured, shown = every.taken(kept), axis.taken(kept)
     way = drive_direction(response)
-    inside = measured.compared & (built["roi"].values == 1)
+    seen = often_seen(measured.displacement)
     return Compared(
         measurement=measured,
         axis=shown,
@@ -89,7 +90,7 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
             asked, structure, measured.track, measured.time, way, args.threads
         ),
         nominal=interpolate_response(response, shown.time),
-        quantities=list_quantities(asked, whole.isel(case=recording.case), shown.time, inside),
+        quantities=list_quantities(asked, whole.isel(case=recording.case), shown.time, seen),
         design=built,
         frequency=frequency,
         level=asked.prediction.level,

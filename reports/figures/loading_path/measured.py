@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from pipeline.comparison import compute_reduction
+from pipeline.comparison import compute_reduction, often_seen
 from reports.base import style
 from reports.facts import MEASURED, Fact, facts_of, intervals
 from reports.figures.loading_path import measures
@@ -29,13 +29,18 @@ _told = facts_of(__file__)
 
 
 def response(study: StudyResults, path: Abscissa, recording: RecordedMotion) -> xr.Dataset:
-    """Forms a recording like the study's response, the simulated intact structure beside it."""
+    """Forms a recording like the study's response, the simulated intact structure beside it.
+
+    Units that were seldom seen are left out, as in what the comparison follows.
+    """
     held = study.response["structure"].values
     names = [name for name in held if name in {"intact", recording.structure}]
     part = study.response.sel(structure=names).isel(case=[recording.case])
     dims = ("structure", "case", "time", "unit", "dof")
     motion = part["displacement"].transpose(*dims).copy(deep=True)
-    measured = recording.at(recording.data["measured"], path.values)
+    shown = recording.data["measured"].transpose("time", "unit", "dof")
+    measured = recording.at(shown, path.values)
+    measured[:, ~often_seen(shown.values)] = np.nan
     motion.values[names.index(recording.structure), 0] = measured
     return part.assign(displacement=motion)
 

@@ -128,6 +128,25 @@ def test_curves_are_those_of_both_sides(whole: xr.Dataset) -> None:
     np.testing.assert_allclose(peaks.sel(source="measured"), peaks.sel(source="nominal"), atol=0.03)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.8], ids=["all seen", "some seldom"])
+def test_curves_are_over_the_units_of_interest_that_were_seen(
+    study: list[str], film: xr.Dataset, tmp_path: Path, share: float
+) -> None:
+    """Count held and driven units too, as the study does; leave out those seen seldom."""
+    roi = datasets.read(study[study.index("--response") + 1], "response")["roi"].values == 1
+    seldom = np.isin(np.arange(len(roi)), np.flatnonzero(roi)[::3])
+    hidden = seldom & (np.arange(len(TIME))[:, None] < share * len(TIME))
+    motion = np.where(hidden[..., None], np.nan, film["displacement"].values)
+    made = film.assign(displacement=(film["displacement"].dims, motion))
+    assert run_stage("compare", words(study, written(made, tmp_path), tmp_path)) == 0
+    told = datasets.read(tmp_path / "comparison.nc", "comparison")
+    assert (told["use"].values[roi] == 1).any()
+    kept = told["nominal"].isel(unit=roi & ~(seldom & (share > 0)))
+    turned = np.abs(kept.sel(dof="theta")).mean("unit")
+    found = told["mean_rotation"].sel(source="nominal", estimate="value")
+    np.testing.assert_allclose(found, turned, rtol=1e-5)
+
+
 def test_the_same_files_give_the_same_bytes(
     study: list[str], film: xr.Dataset, folder: Path, tmp_path: Path
 ) -> None:

@@ -108,3 +108,19 @@ def test_a_measured_motion_in_time_is_its_mean(study: StudyResults, tmp_path: Pa
     course = measured.curve(filmed, path, recording, measures.measure_of(study.problem).of)
     rms = np.sqrt(np.nanmean(course**2))
     assert found[f"measured_{key}_cloaked"] == pytest.approx(float(rms))
+
+
+def test_units_seldom_seen_are_left_out(smile: StudyResults, tmp_path: Path) -> None:
+    """Leave them out where the comparison does, also while they are seen."""
+    filmed = recorded_study.with_recordings(smile, tmp_path, ("cloaked", 0))
+    path = abscissa.abscissa_of(smile.problem, smile.response)
+    [recording] = filmed.recordings
+    whole = recording.data["measured"]
+    late = xr.zeros_like(whole["time"], dtype=bool)
+    late[recording.frames[-2:]] = True
+    hidden = whole.where(late | (whole["unit"] != whole["unit"][0]))
+    some = dataclasses.replace(recording, data=recording.data.assign(measured=hidden))
+    for each, seen in ((recording, True), (some, False)):
+        assert each.data["measured"].isel(unit=0).notnull().any()
+        shown = measured.response(smile, path, each)["displacement"].sel(structure="cloaked")
+        assert bool(shown.isel(case=0, unit=0).notnull().any()) == seen
