@@ -21,12 +21,16 @@ class Quantity(NamedTuple):
     of: Callable[[Floats], Floats]  # of motions (..., frames, n, 3) in mm and rad: (..., frames)
     units: Ints  # (n,) places of the units that count
     less: Floats | None = None  # (frames, n_units, 3) motion that is taken off theirs first
+    over: Floats | None = None  # (instants, n_units) square sizes, whose largest mean divides it
     sampled: bool = True  # whether units stand for others: an interval holds their scatter
     signed: bool = False  # whether it may be below zero; noise makes others larger
 
     def along(self, motion: Floats, units: Ints) -> Floats:
         """Computes the number (..., frames) of motions (..., frames, n, 3) of units (n,)."""
-        return self.of(motion if self.less is None else motion - self.less[:, units])
+        apart = motion if self.less is None else motion - self.less[:, units]
+        if self.over is None:
+            return self.of(apart)
+        return self.of(apart) / largest_size(self.over[:, units], np.isfinite(apart).all(axis=-1))
 
 
 def list_quantities(
@@ -52,13 +56,11 @@ def list_quantities(
     }
     if "intact" in response["structure"].values:
         intact = response.sel(structure="intact")
-        of = partial(normalised_rms, spacing=asked.lattice.spacing)
+        of = partial(root_mean_square, spacing=asked.lattice.spacing)
         motion = intact["displacement"].transpose("time", "unit", "dof").values
-        course = of(motion[:, units])
-        of = partial(of, unit=course[-1] if asked.static else course.max())
-        found["mimicking_error"] = Quantity(
-            of, units, interpolate_response(intact, time).displacement
-        )
+        sizes = square_sizes(motion[-1:] if asked.static else motion, asked.lattice.spacing)
+        less = interpolate_response(intact, time).displacement
+        found["mimicking_error"] = Quantity(of, units, less, sizes)
     return found
 
 
@@ -78,10 +80,26 @@ def mean_approach(motion: Floats, lower: int) -> Floats:
     return known_mean(rise[..., :lower]) - known_mean(rise[..., lower:])
 
 
-def normalised_rms(motion: Floats, spacing: float, unit: float = 1.0) -> Floats:
-    """Computes the root mean square of |U|, U = (ux/spacing, uy/spacing, theta), in units."""
-    square = np.sum((motion / [spacing, spacing, 1.0]) ** 2, axis=-1)
-    return np.asarray(np.sqrt(known_mean(square)) / unit)
+def root_mean_square(motion: Floats, spacing: float) -> Floats:
+    """Computes the root mean square of |U|, U = (ux/spacing, uy/spacing, theta)."""
+    return np.asarray(np.sqrt(known_mean(square_sizes(motion, spacing))))
+
+
+def square_sizes(motion: Floats, spacing: float) -> Floats:
+    """Computes |U|² of each unit (...) of motions (..., 3)."""
+    return np.asarray(np.sum((motion / [spacing, spacing, 1.0]) ** 2, axis=-1))
+
+
+def largest_size(squares: Floats, known: Mask) -> Floats:
+    """Computes the largest root mean square (...) in time over the units that are known.
+
+    Args:
+        squares: (instants, n) of each unit.
+        known: (..., n) the units that count.
+    """
+    sets, place = np.unique(known.reshape(-1, squares.shape[1]), axis=0, return_inverse=True)
+    means = np.array([known_mean(squares[:, each]).max() for each in sets], dtype=float)
+    return np.asarray(np.sqrt(means)[place].reshape(known.shape[:-1]))
 
 
 def middle_units(problem: Problem, side: str) -> list[int]:

@@ -71,18 +71,27 @@ def mismatch(
     """
     inside = interest(response)
     intact = inside.sel(structure="intact")
-    apart: xr.DataArray = squares(inside - intact, scale).mean("unit")
-    return apart**0.5 / size_of_intact(response, scale, static)
+    squared = squares(inside - intact, scale)
+    apart, seen = squared.mean("unit"), squared.notnull()
+    return apart**0.5 / size_of_intact(response, scale, static, seen)
 
 
 def size_of_intact(
-    response: xr.Dataset, scale: tuple[float, float, float], static: bool = True
+    response: xr.Dataset,
+    scale: tuple[float, float, float],
+    static: bool = True,
+    seen: xr.DataArray | None = None,
 ) -> xr.DataArray:
-    """Finds the RMS (case,) of |U_intact| over the region of interest: at the end, most in time."""
-    intact = interest(response).sel(structure="intact")
-    mean: xr.DataArray = squares(intact, scale).mean("unit")
-    size = mean**0.5
-    return size.isel(time=-1, drop=True) if static else size.max("time")
+    """Finds the RMS of |U_intact| over the region of interest: at the end, most in time.
+
+    It is (case,) over all units, or (..., case) over those `seen` (..., case, unit).
+    """
+    intact = squares(interest(response).sel(structure="intact", drop=True), scale)
+    course = intact.isel(time=[-1] if static else slice(None)).rename(time="instant")
+    if seen is None:
+        seen = intact.isel(time=0, drop=True).notnull()
+    mean = xr.dot(seen.astype(float), course, dim="unit") / seen.sum("unit")
+    return mean.max("instant") ** 0.5
 
 
 def overall(problem: Problem, values: xr.DataArray) -> xr.DataArray:

@@ -9,7 +9,8 @@ from pipeline.comparison.compared_quantities import (
     mean_approach,
     mean_displacement,
     mean_rotation,
-    normalised_rms,
+    root_mean_square,
+    square_sizes,
 )
 
 FRAMES, UNITS, NOISE = 60, 40, 0.02
@@ -73,15 +74,33 @@ def test_intervals_of_peaks_are_of_frames_that_were_seen(offset: float) -> None:
 
 def test_a_departure_is_that_from_the_other_motion() -> None:
     intact = WAVES
-    of = partial(normalised_rms, spacing=15.0, unit=normalised_rms(intact, 15.0).max())
-    known = Quantity(of, np.arange(0, UNITS, 2), intact)
+    of, sizes = partial(root_mean_square, spacing=15.0), square_sizes(intact, 15.0)
+    known = Quantity(of, np.arange(0, UNITS, 2), intact, sizes)
     found = curve(sides(1.1 * WAVES, noise=1e-4, gain=1.2), known)
-    exact = 0.1 * normalised_rms(intact[:, ::2], 15.0) / normalised_rms(intact, 15.0).max()
+    size = root_mean_square(intact[:, ::2], 15.0)
+    exact = 0.1 * size / size.max()
     np.testing.assert_allclose(found[0, :, 0], exact, atol=1e-3)
     np.testing.assert_allclose(found[1, :, 0], 2 * exact, atol=1e-9)
     assert (found[0, :, 1] <= found[0, :, 0]).all()
     assert (found[0, :, 0] <= found[0, :, 2]).all()
     assert (found[1, :, 1] < exact).all()
+
+
+def test_a_departure_is_over_the_size_of_the_units_seen() -> None:
+    """Lose units that move more than others: those left depart by the same share."""
+    intact = np.where(np.arange(UNITS)[:, None] % 4, 1.0, 9.0) * WAVES
+    of, still = partial(root_mean_square, spacing=15.0), intact[-1:]
+    known = Quantity(of, np.arange(UNITS), intact, square_sizes(still, 15.0))
+    for lost in (np.s_[:0], np.s_[::4]):
+        seen = sides(1.1 * intact, noise=1e-5)
+        seen.measured[10:20, lost] = np.nan
+        left = np.delete(intact, lost, axis=1)
+        exact = np.full(FRAMES, np.nan)
+        exact[:] = 0.1 * of(intact) / of(still)
+        exact[10:20] = 0.1 * of(left)[10:20] / of(left[-1])
+        found = curve(seen, known)
+        np.testing.assert_allclose(found[0, :, 0], exact, rtol=1e-3)
+        np.testing.assert_allclose(found[0, :, 1:].mean(axis=1), exact, rtol=0.1)
 
 
 @pytest.mark.parametrize("size", [0.0, 0.01, 0.1, 1.0])

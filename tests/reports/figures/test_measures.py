@@ -99,6 +99,24 @@ def test_units_that_were_lost_do_not_count(
     np.testing.assert_allclose(some, seen)
 
 
+@pytest.mark.parametrize("static", [True, False], ids=["static", "in time"])
+def test_a_departure_is_over_the_size_of_the_units_seen(smile: StudyResults, static: bool) -> None:
+    """Lose the units that move most: those left depart by as large a share of their motion."""
+    course = xr.ones_like(smile.response["time"], dtype=float)
+    course[len(course) // 2] = 2.0
+    apart = smile.response.copy(deep=True)
+    fast = apart["unit"] % 2 == 0
+    apart["displacement"][:] = 1.0
+    apart["displacement"] = apart["displacement"].where(~fast, 9.0) * course
+    apart["displacement"].loc[{"structure": "cloaked"}] *= 1.5
+    cloaked = apart["structure"] == "cloaked"
+    lost = apart.assign(displacement=apart["displacement"].where(~(cloaked & fast)))
+    expected = 0.5 * course / (1.0 if static else 2.0)
+    for made in (apart, lost):
+        found = measures.mismatch(made, (S, S, 1.0), static).sel(structure="cloaked")
+        np.testing.assert_allclose(found.isel(case=0), expected)
+
+
 def test_a_measured_motion_in_time_is_its_mean(study: StudyResults, tmp_path: Path) -> None:
     filmed = recorded_study.with_recordings(study, tmp_path, ("cloaked", 0))
     path = abscissa.abscissa_of(study.problem, study.response)
