@@ -17,6 +17,14 @@ PROMINENT = 0.2
 """Height of a peak of the force over its whole range."""
 SUDDEN = 0.2
 """Way of a snap over the branch's, at most."""
+START = 0.05
+"""Part of a branch's way over which its start is averaged."""
+CLEAR = 4.0
+"""Standard deviations of the noise above which a toe is at least."""
+LEAST_RESTING = 20
+"""Readings from which the noise before contact is estimated, at least."""
+MEDIAN_SIGMAS = 1.4826
+"""Standard deviation over the median magnitude, of normal noise."""
 
 
 class LoadBranch(NamedTuple):
@@ -141,22 +149,43 @@ def _from_start(branch: LoadBranch, options: RecordOptions) -> tuple[Floats, Flo
     turn = slice(None) if branch.loading else slice(None, None, -1)
     way, load = way[turn], load[turn]
     if options.zero == "start":
-        load = load - load[0]
-        way = way - way[0]
-    if options.toe is None:
-        return way, load
-    # the straight line between the toe's force and twice as much meets the axis at the start
-    start = 2 * _reaches(way, load, options.toe) - _reaches(way, load, 2 * options.toe)
-    felt = int(np.argmax(load >= options.toe))
-    return (way - start)[felt:], load[felt:]
+        first = way <= way.min() + START * np.ptp(way)
+        way, load = way - way[first].mean(), load - load[first].mean()
+    return (way, load) if options.toe is None else _from_contact(way, load, options.toe)
 
 
-def _reaches(way: Floats, load: Floats, level: float) -> float:
-    above = load >= level
-    k = int(np.argmax(above))
-    if not above.any():
-        raise ValueError(f"the force does not rise to {level:g} N")
-    if k == 0:
-        raise ValueError(f"the force begins above {level:g} N")
+def _from_contact(way: Floats, load: Floats, toe: float) -> tuple[Floats, Floats]:
+    """Counts the displacement from where the line between the toe and twice as much meets zero.
+
+    Contact is after the last reading below the toe that comes before the first of twice as much.
+    """
+    if not (load >= 2 * toe).any():
+        raise ValueError(f"the force does not rise to {2 * toe:g} N")
+    risen = int(np.argmax(load >= 2 * toe))
+    below = np.flatnonzero(load[:risen] < toe)
+    if not len(below):
+        raise ValueError(f"the force begins above {toe:g} N")
+    felt = int(below[-1]) + 1
+    if (clear := CLEAR * _noise(load[: max(felt, LEAST_RESTING)])) > toe:
+        raise ValueError(
+            f"the toe of {toe:g} N is not clear of the force's noise before contact: give"
+            f" {clear:.2g} N or more"
+        )
+    ends = [_crossing(way, load, k, level) for k, level in ((felt, toe), (risen, 2 * toe))]
+    along = np.array([ends[0], *way[felt:risen], ends[1]])
+    if along[-1] <= along[0]:
+        raise ValueError(f"the force rises from {toe:g} N to {2 * toe:g} N without motion")
+    slope, offset = np.polyfit(along, np.array([toe, *load[felt:risen], 2 * toe]), 1)
+    return (way + offset / slope)[felt:], load[felt:]
+
+
+def _noise(load: Floats) -> float:
+    """Estimates the standard deviation of readings' noise about a smooth course."""
+    bends = np.abs(np.diff(load, 2))
+    return MEDIAN_SIGMAS * float(np.median(bends)) / 6**0.5 if len(bends) else 0.0
+
+
+def _crossing(way: Floats, load: Floats, k: int, level: float) -> float:
+    """Interpolates where the force passes a level between a reading and the one before."""
     part = (level - load[k - 1]) / (load[k] - load[k - 1])
     return float(way[k - 1] + part * (way[k] - way[k - 1]))

@@ -62,9 +62,11 @@ class RecordOptions(Section):
         reversed: what the machine counts the other way than the test's direction; of a track the
             force alone can be.
         drop_first: leaves out the first cycle.
-        zero: of displacement and force: as they are, or where each branch starts.
-        toe: force by which the slack is taken up; the displacement then counts from where the line
-            through that force and twice as much meets zero, and what is below is left out.
+        zero: of displacement and force: as they are, or their means over the first twentieth of
+            each branch's way.
+        toe: force by which the slack is taken up, at least 4 times the noise; the displacement then
+            counts from where the line fitted from that force to twice as much meets zero, and what
+            is before is left out.
     """
 
     branch: Literal["all", "loading", "unloading"] = "loading"

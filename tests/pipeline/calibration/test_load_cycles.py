@@ -113,6 +113,34 @@ def test_a_toe_that_a_branch_does_not_show_is_refused(toe: str, told: str) -> No
         load_cycles.prepare_record(cycles()[0], cycles()[1] + 0.3, options)
 
 
+def noisy(noise: float) -> tuple[np.ndarray, np.ndarray]:
+    """Loads to 5 mm at 0.6 N/mm, with a slack of 1 mm and offsets of both zeros."""
+    way = np.linspace(0, 5, 400)
+    scatter = np.random.default_rng(1).normal(0, noise, len(way))
+    return way + 0.7, 0.6 * np.maximum(way - 1.0, 0.0) - 0.2 + scatter
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.02])
+def test_noise_biases_neither_zero_nor_contact(noise: float) -> None:
+    options = RecordOptions.model_validate({"zero": "start", "toe": "0.1 N"})
+    way, force = load_cycles.prepare_record(*noisy(noise), options)
+    assert np.median(way - force / 0.6) == pytest.approx(0.0, abs=0.1)
+    assert way @ force / (way @ way) == pytest.approx(0.6, rel=0.05)
+
+
+def test_a_toe_within_the_noise_is_refused() -> None:
+    options = RecordOptions.model_validate({"zero": "start", "toe": "0.1 N"})
+    with pytest.raises(ValueError, match=r"not clear of the force's noise .* give 0.1\d N or more"):
+        load_cycles.prepare_record(*noisy(0.04), options)
+
+
+def test_a_force_that_rises_at_rest_is_no_contact() -> None:
+    way, force = np.repeat([0.0, 1.0, 2.0], 40), np.arange(120) / 120
+    options = RecordOptions.model_validate({"toe": "0.1 N"})
+    with pytest.raises(ValueError, match="from 0.1 N to 0.2 N without motion"):
+        load_cycles.prepare_record(way, force, options)
+
+
 @pytest.mark.parametrize(("reversed_", "signs"), [("both", (-1, -1)), ("force", (1, -1))])
 def test_what_a_machine_counts_backwards_is_turned(reversed_: str, signs: tuple[int, int]) -> None:
     way, force = cycles()
