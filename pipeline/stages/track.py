@@ -233,7 +233,8 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     track = followed(asked, design, video, path)
     force = None
     if log is not None and asked.load_cell is not None:
-        force = load_cell.forces(log, track.start + track.time, asked.load_cell.zero)
+        resting = track.resting if asked.load_cell.zero == "start" else 0
+        force = load_cell.forces(log, track.start + track.time, resting)
     if force is not None and not np.isfinite(force).any():
         LOG.warning("the load cell's log holds no force at the times of the frames")
     made = assemble_track(design, track, force)

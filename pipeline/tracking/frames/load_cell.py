@@ -1,7 +1,7 @@
 """Samples forces that were logged beside a video at the times of its frames."""
 
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,7 +39,7 @@ def read(path: Path, cell: LoadCellLog) -> ForceLog:
     return ForceLog(clock - cell.offset, -force if cell.reversed else force)
 
 
-def forces(log: ForceLog, time: Floats, zero: Literal["file", "start"] = "file") -> Floats:
+def forces(log: ForceLog, time: Floats, resting: int = 0) -> Floats:
     """Returns the force (frames,) in N, linear between the log's lines, NaN beyond them.
 
     Where the log is finer than the video, it is averaged over the frame's interval first, so that
@@ -48,11 +48,11 @@ def forces(log: ForceLog, time: Floats, zero: Literal["file", "start"] = "file")
     Args:
         log: of the load cell.
         time: (frames,) since the file's first frame, s.
-        zero: as the file counts, or where the frames start.
+        resting: number of first frames whose mean force is zero; 0 leaves forces as logged.
     """
     inside = (time >= log.clock[0]) & (time <= log.clock[-1])
     force = np.where(inside, _smooth(log.clock, log.force, time), np.nan)
-    return force - force[0] if zero == "start" else force
+    return force - force[:resting].mean() if resting else force
 
 
 def check(log: ForceLog, window: tuple[float, float], path: Path, cell: LoadCellLog) -> None:

@@ -52,7 +52,8 @@ class LoadCellLog(Section):
         force: name of the column of forces, likewise, or N.
         offset: time of the video's first frame on the log's clock, s.
         reversed: whether the cell counts the other way, such as compression negative.
-        zero: of forces: as they are, or where the tracked part of the video starts.
+        zero: of forces: as they are, or their mean over the frames in which the specimen rests
+            where the tracked part of the video starts.
     """
 
     file: str = Field(min_length=1)

@@ -73,6 +73,7 @@ class Track(NamedTuple):
     timing: Ints  # (frames,) as in `frame_timing`
     calibration: CameraCalibration  # of the camera
     ended: _End | None  # what ended it before the video's end, if anything did
+    resting: int  # number of first frames in which the specimen rests
 
 
 def track_video(
@@ -150,7 +151,7 @@ def track_video(
     vague = _vague(sigma, calibration.pixel)
     motion[vague], sigma[vague], qualities[vague] = np.nan, np.nan, POOR_FIT
     start = float(times[0])
-    return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended)
+    return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended, rest)
 
 
 def _lens_variance(

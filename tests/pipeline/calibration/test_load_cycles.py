@@ -137,7 +137,7 @@ def test_a_toe_within_the_noise_is_refused() -> None:
 def test_a_force_that_rises_at_rest_is_no_contact() -> None:
     way, force = np.repeat([0.0, 1.0, 2.0], 40), np.arange(120) / 120
     options = RecordOptions.model_validate({"toe": "0.1 N"})
-    with pytest.raises(ValueError, match="from 0.1 N to 0.2 N without motion"):
+    with pytest.raises(ValueError, match="N without motion"):
         load_cycles.prepare_record(way, force, options)
 
 

@@ -39,10 +39,16 @@ def test_a_cell_counts_along_the_drive_and_from_the_start_if_asked(tmp_path: Pat
     read = load_cell.read(path, cell)
     load_cell.check(read, (0.0, 0.4), path, cell)
     np.testing.assert_allclose(load_cell.forces(read, TIME), 8.0 + 10 * TIME)
-    np.testing.assert_allclose(load_cell.forces(read, TIME, cell.zero), 10 * TIME, atol=1e-12)
+    np.testing.assert_allclose(load_cell.forces(read, TIME, 1), 10 * TIME, atol=1e-12)
     late = log(tmp_path, "time,force\n0.2,-8.0\n0.4,-12.0\n")
     with refused("after the first frame", "load_cell.zero"):
         load_cell.check(load_cell.read(late, cell), (0.0, 0.4), late, cell)
+
+
+def test_the_zero_is_the_mean_over_the_frames_at_rest() -> None:
+    noise = np.array([1.0, -1.0, 0.0, 0.5, 0.5])
+    found = load_cell.forces(load_cell.ForceLog(TIME, 8.0 + noise), TIME, 3)
+    np.testing.assert_allclose(found, noise, atol=1e-12)
 
 
 @cases("tracking", "text, offset, told")
