@@ -310,27 +310,40 @@ def _from_rest(scene: Scene, plan: Plan) -> Evaluator | None:
     """Evaluates by a path followed anew, over the loads of the plan; None of a motion in time.
 
     A path that starts from that of a similar design may pass where it should end. Where the design
-    is to avoid snaps, one on that path is an error.
+    is to avoid snaps, one of the perfect structure on that path is an error.
     """
     if not isinstance(plan.solver, StaticSolver):
         return None
-    memory = None if scene.objective.snap_margin is None else _Unsnapped(scene.loads.duration)
-    solver = plan.confirming
-    at = np.searchsorted(solver.output_times, sample_times(scene) * (1 - 1e-9))
-    return Evaluator(scene, replace(plan, solver=solver), memory, at=at)
+    made = replace(plan, solver=plan.confirming)
+    memory = None if scene.objective.snap_margin is None else _Unsnapped(scene, made)
+    at = np.searchsorted(made.solver.output_times, sample_times(scene) * (1 - 1e-9))
+    return Evaluator(scene, made, memory, at=at)
 
 
 class _Unsnapped:
-    """Remembers nothing, and refuses a path on which the structure snaps (``Memory``)."""
+    """Remembers nothing, and refuses designs whose structure snaps (``Memory``).
 
-    def __init__(self, load: float) -> None:
-        self._load = load
+    As the constraint does, it looks at the perfect structure: copies count by their losses alone.
+    """
+
+    def __init__(self, scene: Scene, plan: Plan) -> None:
+        self._scene, self._plan = scene, plan
 
     def start(self) -> None:
         """See ``Memory``."""
 
     def keep(self, design: Floats, records: Sequence[StaticRecord]) -> None:
         """Raises SimulationError where the structure snaps."""
-        del design
+        if self._scene.design.copies is not None:
+            snapping = sum(bool(record.jumped.any()) for record in records)
+            LOG.info("%d of %d paths of imperfect copies snap", snapping, len(records))
+            records = self._perfect(design)
         for record in records:
-            check_unsnapped(record, self._load)
+            check_unsnapped(record, self._scene.loads.duration)
+
+    def _perfect(self, design: Floats) -> Sequence[StaticRecord]:
+        """Follows the perfect structure of a design under all cases."""
+        values = concrete(parameters_of_design(self._scene)(design))
+        cases = [self._scene.loads.cases[case] for case in self._plan.simulated]
+        _, _, records = solve_cases(self._plan.solver, values, cases)
+        return records.records

@@ -137,7 +137,7 @@ class ObjectiveSection(Section):
         robust: what else the design is to hold against, if anything.
         loads: all loads that it is to hold against, in ranges; in place of `robust`.
         snap: whether a static structure may snap to another branch of equilibria on its way, or is
-            designed to avoid it.
+            designed to avoid it; imperfect copies may.
         snap_margin: smallest eigenvalue of the tangent that all loads must then leave, as a share
             of that of the initial structure at rest.
     """

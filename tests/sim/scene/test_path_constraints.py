@@ -11,7 +11,7 @@ from sim.core import Floats
 from sim.optimise import Result
 from sim.scene import PathConstraints, foil_strains
 from sim.scene.evaluation import _from_rest
-from sim.structure import FoilLimit
+from sim.structure import Copies, FoilLimit
 from tests.sim.structures import central, pressed, taylor_orders
 from tests.tables import some
 
@@ -108,6 +108,27 @@ def test_a_design_that_snaps_is_not_confirmed() -> None:
     options = sim.SqpOptions(evaluations=5, retreats=0)
     shipped = sim.minimise(posed, LIMITS, snapping, options=options)
     assert not sim.simulate(posed, shipped.x).records[0].jumped.any()
+
+
+def test_imperfect_copies_may_snap_where_the_perfect_structure_does_not(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """A copy as the design that snaps is confirmed, that design with a copy at rest is refused."""
+    posed, snapping = scene(0.2), best_design(None).x
+    shifts = np.zeros((1, posed.lattice.n_groups, 2))
+    shifts[0, posed.lattice.group] = posed.space.vertices(snapping) - posed.lattice.vertices
+    stiffness = np.ones((1, 3, posed.lattice.n_ligaments))
+    caplog.set_level("INFO")
+    for sign, design in ((1, np.zeros_like(snapping)), (-1, snapping)):
+        copied = posed.updated(copies=Copies(sign * shifts, stiffness))
+        confirm = _from_rest(copied, sim.make_plan(copied))
+        assert confirm is not None
+        if sign > 0:
+            assert np.isfinite(confirm(design)[0])
+            assert "1 of 1 paths of imperfect copies snap" in caplog.text
+        else:
+            with pytest.raises(sim.SimulationError, match="snaps at"):
+                confirm(design)
 
 
 def largest_strain(posed: sim.Scene, design: Floats) -> float:
