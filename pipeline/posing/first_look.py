@@ -123,6 +123,7 @@ def doubts(asked: Problem, scene: Scene) -> Iterator[str]:
                 " which no cloak hides: pull them (`drive.directions: [0 deg]`), or push them less"
             )
     yield from _idle(asked)
+    yield from _cut_off(asked)
     yield from _shown(asked)
     yield from _picture(asked)
     yield from _necks(scene.lattice)
@@ -214,6 +215,22 @@ def _idle(asked: Problem) -> Iterator[str]:
         name = key.rpartition(".")[2]
         if not used and getattr(section, name) != type(section).model_fields[name].default:
             yield f"`{key}` does nothing: it is for {what} alone; leave it out"
+
+
+def _cut_off(asked: Problem) -> Iterator[str]:
+    """Doubts loads of `robust.loads` slower than the drive, whose motion is judged in part."""
+    robust, wanted = asked.objective.robust, asked.horizon.periods
+    if robust is None or wanted is None:
+        return
+    for number, load in enumerate(robust.loads):
+        periods = wanted if load.frequency is None else load.frequency * asked.horizon_time
+        if periods < wanted * (1 - 1e-6):
+            yield (
+                f"`objective.robust.loads[{number}].frequency`: the loss counts {periods:.3g}"
+                f" periods of it and not {wanted:g}, as all loads are judged over the drive's"
+                f" {asked.horizon_time:.3g} s; raise `horizon.periods`, or take the lowest"
+                " frequency for the drive's own"
+            )
 
 
 def _shown(asked: Problem) -> Iterator[str]:

@@ -15,7 +15,8 @@ class Load(Section):
 
     Attributes:
         amplitude: in place of the drive's.
-        frequency: in place of the drive's.
+        frequency: in place of the drive's; its loss is over the drive's own horizon, in seconds,
+            into which fewer periods of a slower load fit.
         weight: in the loss, where the drive's own loads have the weight 1 together.
     """
 

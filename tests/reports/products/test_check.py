@@ -116,6 +116,18 @@ def test_keys_that_nothing_takes_up_are_doubted(
     assert told.startswith(f"`{section}.{key}` does nothing")
 
 
+def test_loads_slower_than_the_drive_are_doubted(tmp_path: Path) -> None:
+    """By two periods of 2 Hz they are judged over one second."""
+    asked = load(ROOT / "experiments/fig2/problem.yaml")
+    loads = [{"frequency": f"{each} Hz"} for each in (0.5, 2, 8)]
+    robust = Robust.model_validate({"loads": [*loads, {"amplitude": "2 mm"}]})
+    objective = asked.objective.model_copy(update={"robust": robust})
+    slower = asked.model_copy(update={"objective": objective})
+    (told,) = doubts(slower, scene_of(asked, tmp_path))
+    assert told.startswith("`objective.robust.loads[0].frequency`: the loss counts 0.5 periods")
+    assert "and not 2" in told
+
+
 def test_descents_and_imperfect_copies_take_time(tmp_path: Path) -> None:
     path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
     more = "law: geometric", "optimiser: { angle: { evaluations: 3 }, descents: 2,"
