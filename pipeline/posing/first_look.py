@@ -203,6 +203,7 @@ def _inward(drive: SingleDrive, scene: Scene) -> bool:
 def _idle(asked: Problem) -> Iterator[str]:
     """Doubts keys of other values than by default, which nothing in the problem takes up."""
     moving, avoiding = not asked.static, asked.objective.snap == "avoid"
+    twice = "sqp" in asked.optimiser.methods.chosen and asked.contact.law == "geometric"
     keys = (
         (asked.solver, "solver.accuracy", moving, "motions in time"),
         (asked.solver, "solver.integrator", moving, "motions in time"),
@@ -210,6 +211,7 @@ def _idle(asked: Problem) -> Iterator[str]:
         (asked.report, "report.instants", moving, "motions in time"),
         (asked.report, "report.snapshots", not moving, "static paths"),
         (asked.objective, "objective.snap_margin", avoiding, "`objective.snap: avoid`"),
+        (asked.optimiser, "optimiser.angle", twice, "SQP with contact on distance"),
     )
     for section, key, used, what in keys:
         name = key.rpartition(".")[2]

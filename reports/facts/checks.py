@@ -21,9 +21,9 @@ _told = facts_of(__file__)
 
 def history_facts(problem: Problem, design: xr.Dataset) -> Iterator[Fact]:
     """Yields evaluations, best feasible loss and optimality of every method, and of descents."""
-    first, unit = problem.optimiser.angle, design["best_loss"].attrs["units"]
-    if first is not None and problem.contact.law == "geometric":
-        yield _told("evaluations_angle", first.evaluations)
+    unit = design["best_loss"].attrs["units"]
+    if problem.optimiser.angle is not None:
+        yield from _first_fact(problem, problem.optimiser.angle.evaluations)
     for method in design["method"].values:
         history, of = design.sel({"method": method}), {"method": method, "name": method.upper()}
         loss, at = history["loss"].values, int(history["best_evaluation"])
@@ -42,6 +42,16 @@ def history_facts(problem: Problem, design: xr.Dataset) -> Iterator[Fact]:
         if without := len(descents) - len(losses):
             words += f"; {without} without a design"
         yield _told("descents", max(losses) / min(losses), words, count=len(descents))
+
+
+def _first_fact(problem: Problem, evaluations: int) -> Iterator[Fact]:
+    """Tells the budget of SQP by the angle law, from whose design it alone goes on."""
+    optimiser = problem.optimiser
+    methods = optimiser.methods.chosen
+    if "sqp" in methods and problem.contact.law == "geometric":
+        each = ", in each descent" if optimiser.descents > 1 else ""
+        other = "; MMA does without" if "mma" in methods else ""
+        yield _told("evaluations_angle", evaluations, each=each, other=other)
 
 
 def error_facts(response: xr.Dataset, note: str) -> Iterator[Fact]:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from pipeline.posing import law_comparison
 from pipeline.problem import Output
-from pipeline.problem.sections import Paper
+from pipeline.problem.sections import Method, Methods, Paper
 from reports.facts import checks, fact_records, loss_formula
 from reports.facts.copies import spreads
 from reports.figures import kinds
@@ -322,8 +322,28 @@ def test_the_page_is_whole(shield: StudyResults, tmp_path: Path) -> None:
     assert cells == once * (len(cells) // 4)
 
 
-@pytest.mark.parametrize("law", ["angle", "geometric"])
-def test_evaluations_by_angle(smile: StudyResults, law: Literal["angle", "geometric"]) -> None:
-    asked = smile.problem.with_optimiser(angle=smile.problem.optimiser.methods.sqp)
-    found = checks.history_facts(law_comparison.under(asked, law), smile.design)
-    assert ("evaluations_angle" in {fact.key for fact in found}) == (law == "geometric")
+@pytest.mark.parametrize(
+    ("law", "method", "descents", "told"),
+    [
+        ("angle", "sqp", 1, None),
+        ("geometric", "mma", 1, None),
+        ("geometric", "sqp", 1, "; SQP below starts from there"),
+        ("geometric", "both", 2, ", in each descent; SQP below starts from there"),
+    ],
+)
+def test_evaluations_by_angle(
+    smile: StudyResults,
+    law: Literal["angle", "geometric"],
+    method: str,
+    descents: int,
+    told: str | None,
+) -> None:
+    budget = Method(evaluations=3)
+    methods = Methods(**{name: budget for name in ("sqp", "mma") if method in (name, "both")})
+    asked = smile.problem.with_optimiser(angle=budget, methods=methods, descents=descents)
+    facts = checks.history_facts(law_comparison.under(asked, law), smile.design)
+    notes = [fact.note for fact in facts if fact.key == "evaluations_angle"]
+    assert len(notes) == (told is not None)
+    if told is not None:
+        assert f"by the angle law of contact{told}" in notes[0]
+        assert notes[0].endswith("; MMA does without") == (method == "both")

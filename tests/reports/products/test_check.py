@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw
 
 from pipeline.posing import cost_line, doubts, scene_of
 from pipeline.problem import load
-from pipeline.problem.sections import Robust
+from pipeline.problem.sections import Method, Robust
 from pipeline.runtime import ROOT
 from reports.__main__ import main
 from reports.products import check
@@ -104,6 +104,7 @@ def test_pictures_beyond_the_load_are_doubted(
         ("response", "cycles", 2.0),
         ("report", "instants", (0.5,)),
         ("objective", "snap_margin", 0.2),
+        ("optimiser", "angle", Method(evaluations=3)),
     ],
 )
 def test_keys_that_nothing_takes_up_are_doubted(
