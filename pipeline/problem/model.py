@@ -247,7 +247,9 @@ class Problem(Section):
 
     def asks_more_than(self, own: Problem) -> bool:
         """Tells a preset of the study `own` that is to hold against more or other loads."""
-        return self.objective.robust is not None or self.drive.kind != own.drive.kind
+        robust = self.objective.robust
+        other = robust is not None and robust != own.objective.robust
+        return other or self.drive.kind != own.drive.kind
 
     @property
     def frequency(self) -> float | None:

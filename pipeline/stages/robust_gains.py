@@ -75,7 +75,7 @@ def gains(path: Path, designs: Mapping[str, Path]) -> xr.Dataset:
     own = problem.load(path)
     presets = [name for name in designs if name != PLAIN]
     with cli.progress(len(presets) + 1, "losses") as bar:
-        drive = _loss(own, path, designs[PLAIN])
+        drive = _loss(_held_out(own), path, designs[PLAIN])
         bar.update()
         rows = []
         for name in presets:
@@ -92,7 +92,7 @@ def gains(path: Path, designs: Mapping[str, Path]) -> xr.Dataset:
 
 
 def _gain(path: Path, preset: str, designs: Mapping[str, Path]) -> Gain:
-    """One preset; the copies are others than its design was made with."""
+    """One preset; the copies are others than any design was made with."""
     asked, drive = problem.load(path, preset), problem.load(path)
     if not asked.asks_more_than(drive):
         what, remedy = "the preset asks for nothing but the study's own drive", "leave it out"
@@ -106,7 +106,7 @@ def _gain(path: Path, preset: str, designs: Mapping[str, Path]) -> Gain:
         loss_plain=plain,
         loss_own=own,
         loss_altered=_loss(held, path, None, preset),
-        price=_loss(drive, path, designs[preset]),
+        price=_loss(_held_out(drive), path, designs[preset]),
     )
 
 

@@ -16,7 +16,6 @@ from pipeline.workflow.studies import (
     families,
     joints,
     problem_of,
-    studies,
     targets,
     together,
 )
@@ -102,7 +101,7 @@ def _check_presets(study: Study, end: str) -> None:
         what = f"{study.name} is a figure of several studies"
         raise UserError(what, file=f"experiments/{study.name}/figure.yaml", remedy=f"build {named}")
     if end == "_gains" and not robust_presets(study.name):
-        what = "no preset of the study asks for more than its own drive"
+        what = "no preset of the study's lattice and void asks for more than its own drive"
         remedy = "add a preset with objective.robust, or with a drive of another kind"
         raise UserError(what, file=study.problem, key="presets", remedy=remedy)
     if end == "_front" and not presets_in_ranges(study.name):
@@ -112,10 +111,19 @@ def _check_presets(study: Study, end: str) -> None:
 
 
 def robust_presets(name: str) -> list[Study]:
-    """Lists the presets of a study that ask for more than the study itself."""
+    """Lists the presets that ask for more than the study itself, of designs that fit both.
+
+    Presets of several designs, or under loads in ranges, have their front and certificates.
+    """
     own = problem_of(Study(name))
-    mine = [study for study in studies() if study.name == name and study.preset]
-    return [study for study in mine if problem_of(study).asks_more_than(own)]
+    mine = [each for each, group in families().items() if each.name == name and not group]
+    return [each for each in mine if each.preset and _is_compared(problem_of(each), own)]
+
+
+def _is_compared(asked: Problem, own: Problem) -> bool:
+    """Tells a preset whose design is compared with that of the study `own` under what it asks."""
+    alike = (asked.lattice, asked.void) == (own.lattice, own.void)
+    return alike and asked.objective.loads is None and asked.asks_more_than(own)
 
 
 def presets_in_ranges(name: str) -> dict[Study, list[Study]]:

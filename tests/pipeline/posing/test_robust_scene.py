@@ -11,9 +11,10 @@ from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.posing import design_scene, load_family, scene_of, under_worst
 from pipeline.problem.reading import load, overlay_keys
+from pipeline.stages import robust_gains
 from reports.__main__ import main
 from sim.load_family import LoadLosses
-from sim.scene import concrete_parameters, simulate
+from sim.scene import Scene, concrete_parameters, simulate
 from sim.solvers import Harmonic
 from tests.pipeline.conftest import Failing
 from tests.pipeline.samples import sample
@@ -100,6 +101,24 @@ def test_gains_are_over_the_own_design(hole: list[str], tmp_path: Path, failing:
     assert "<td>tolerant</td>" in text
     assert "<td>0.0%</td>" in text
     assert "one of a preset" in failing("robust_gains", [*words, f"plain={shipped}"])
+
+
+def test_gains_of_a_robust_study_are_over_copies_that_it_does_not_know(
+    hole: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counted = []
+
+    def counting(scene: Scene, *_: object) -> float:
+        counted.append(0 if scene.design.copies is None else len(scene.design.copies))
+        return 1.0
+
+    monkeypatch.setattr(robust_gains, "_over_copies", counting)
+    more = "presets: { worst: { objective: { robust: { copy_sharpness: 8 } } } }\n"
+    held = HOLE.replace("target: intact", "target: intact, robust: { copies: 2 }")
+    path = write(tmp_path, held + more, size=5, amplitude=3.0)
+    shipped = Path(hole[1]).with_name("design.nc")
+    robust_gains.gains(path, {"plain": shipped, "worst": shipped})
+    assert counted == [16] * 5
 
 
 def test_a_pulse_is_a_load_of_its_own(fig2: Path) -> None:
