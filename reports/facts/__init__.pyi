@@ -25,5 +25,6 @@ from .fact_records import table as table
 from .fact_records import within as within
 from .fact_records import worded as worded
 from .formulas import loss_formula as loss_formula
+from .formulas import weighted_force as weighted_force
 from .measured_constants import constants_facts as constants_facts
 from .recording_facts import intervals as intervals

@@ -10,6 +10,7 @@ from pipeline.posing import design_hash
 from pipeline.problem import Problem
 from reports.facts import foil, measures
 from reports.facts.fact_records import Fact, facts_of, percent, within, worded
+from reports.facts.formulas import weighted_force
 from reports.study import RigidUnits, display_name, evaluation_count
 from sim.core import instruction_set
 
@@ -31,6 +32,7 @@ def history_facts(problem: Problem, design: xr.Dataset) -> Iterator[Fact]:
         soon = measures.first_within(loss, best, 0.9)
         yield _told("evaluations_{method}", count, at=at, soon=soon, **of)
         note = "shipped" if method == design.attrs.get("shipped_method") else "not shipped"
+        note += weighted_force(problem)
         yield _told("best_{method}", best, unit=unit, note=note, **of)
         violation = float(history["violation"].isel(evaluation=at))
         yield _told("violation_{method}", violation, **of)

@@ -132,9 +132,10 @@ class ObjectiveSection(Section):
         kind: what is compared: displacements and rotations, or the strain energy.
         target: stay at rest, or do as in the intact lattice.
         region: the units that are looked at; `surroundings` are all but void, inclusion and cloak.
-        reaction: weight of the relative error of the drive's force, added to that of the motion,
-            where the intact lattice is mimicked; none by default. The force is that of ligaments:
-            where contact is on distance, without what units that touch press on those driven.
+        reaction: weight of the relative error of the drive's force, added to that of the motion
+            while designing, where the intact lattice is mimicked; none by default. Losses of
+            responses are of the motion alone. The force is that of ligaments: where contact is on
+            distance, without what units that touch press on those driven.
         robust: what else the design is to hold against, if anything.
         loads: all loads that it is to hold against, in ranges; in place of `robust`.
         snap: whether a static structure may snap to another branch of equilibria on its way, or is

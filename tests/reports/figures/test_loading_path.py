@@ -79,7 +79,10 @@ def test_a_loss_has_its_formula(
     )
     formula = loss_formula(asked)
     assert "mean over the time of ‖U − U₀‖², divided by max ‖U₀‖," in formula
-    assert formula.endswith("; plus 0.5 times the same of the drive’s force")
+    assert formula.endswith("; of the motion alone, without the drive’s force")
+    told = {fact.key: fact for fact in checks.history_facts(asked, smile.design)}
+    best = next(fact for key, fact in told.items() if key.startswith("best_"))
+    assert best.note.endswith("; plus 0.5 times the relative error of the drive’s force")
 
 
 def test_recordings_are_placed_and_have_the_only_bands(smile: StudyResults, tmp_path: Path) -> None:
