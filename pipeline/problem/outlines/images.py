@@ -5,20 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from io import BytesIO
-from itertools import groupby
-from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.problem.outlines.painted_areas import Painted, painted_outlines, wound_outlines
 from pipeline.problem.outlines.plane import Outline, extents
 from pipeline.runtime import UserError, read_bounded
 
 if TYPE_CHECKING:
-    from shapely import Geometry
     from svgelements import Path as SvgPath
     from svgelements import Shape
 
@@ -52,8 +50,8 @@ def read_outlines(
 
     A point within an odd number of them lies in the shape. A pixel is in it below the `threshold`,
     a grey level from 0 of black to 1 of white; without it, an image must be binary. So is a part of
-    a drawing, whose light parts cut those they lie on; fills that overlap are one, and a fill that
-    crosses or holds its own outline has holes. `invert` takes what is light.
+    a drawing, whose light parts cut those they lie on; fills that overlap are one, and a fill has
+    the holes that its `fill-rule` leaves. `invert` takes what is light.
 
     Raises:
         UserError: no such file, unreadable, not binary, or without a shape.
@@ -150,12 +148,16 @@ def _of_drawing(path: Path, threshold: float | None, invert: bool) -> list[NDArr
         drawn = [[points for points in _pieces(each, count) if len(points) > 2] for each in paths]
         if any(not (np.abs(points) < FARTHEST).all() for pieces in drawn for points in pieces):
             raise ValueError(f"it has points further than {FARTHEST:g} from its origin")
+        filled = [
+            wound_outlines(pieces) if _is_wound(each) else pieces
+            for each, pieces in zip(paths, drawn, strict=True)
+        ]
     # an XML parse error is a SyntaxError; a radius or a scale of 1e-300 divides by zero
     except (OSError, ValueError, SyntaxError, ArithmeticError, RecursionError) as error:
         raise UserError(f"not a readable SVG: {error}", remedy="save it as plain SVG") from error
     level = LIGHT if threshold is None else 255 * threshold
     shown = [(_grey(each) < level) != invert for each in paths]
-    return _painted([*map(_Painted, shown, map(_is_filled, paths), drawn)])
+    return painted_outlines([*map(Painted, shown, map(_is_filled, paths), filled)])
 
 
 def _is_seen(shape: Shape) -> bool:
@@ -168,6 +170,11 @@ def _is_seen(shape: Shape) -> bool:
 
 def _is_filled(shape: Shape) -> bool:
     return _paints(shape, "fill")
+
+
+def _is_wound(shape: Shape) -> bool:
+    """Tells a fill of all that its outline winds round, whichever way and how often."""
+    return _is_filled(shape) and str(shape.values.get("fill-rule")).strip() != "evenodd"
 
 
 def _paints(shape: Shape, kind: str) -> bool:
@@ -188,51 +195,6 @@ def _grey(path: SvgPath) -> float:
             paint = getattr(path, kind)
             return (paint.red + paint.green + paint.blue) / 3
     return 0.0
-
-
-class _Painted(NamedTuple):
-    """Holds the outlines of a path, and how they are painted."""
-
-    in_shape: bool
-    filled: bool
-    pieces: list[NDArray[Any]]
-
-
-def _painted(paths: list[_Painted]) -> list[NDArray[Any]]:
-    """Lists outlines of what is in the shape, each path being painted over those before it."""
-    import shapely
-
-    if _apart(paths):
-        return [points for each in paths for points in each.pieces]
-    shape = shapely.Polygon()
-    for in_shape, layer in groupby(paths, key=attrgetter("in_shape")):
-        area = shapely.union_all(_areas([*layer]))
-        shape = shape | area if in_shape else shape - area
-    parts = [part for part in shapely.get_parts(shape) if part.area > 0.0]
-    rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
-    return [np.array(ring.coords)[:-1] for ring in rings]
-
-
-def _apart(paths: list[_Painted]) -> bool:
-    """Tells paths that are all in the shape and overlap nowhere, so that it has their outlines."""
-    import shapely
-
-    if not all(each.in_shape for each in paths):
-        return False
-    areas = _areas(paths)
-    return sum(area.area for area in areas) <= (1.0 + 1e-9) * shapely.union_all(areas).area
-
-
-def _areas(paths: list[_Painted]) -> list[Geometry]:
-    """Lists the areas of fills, and the one that an odd number of lines without a fill encloses."""
-    import shapely
-
-    fills = [each.pieces for each in paths if each.filled]
-    lines = [points for each in paths if not each.filled for points in each.pieces]
-    return [
-        shapely.make_valid(shapely.MultiPolygon([shapely.Polygon(points) for points in pieces]))
-        for pieces in (*fills, lines)
-    ]
 
 
 def _parsed(drawing: ElementTree.Element) -> tuple[list[Any], list[SvgPath]]:

@@ -118,6 +118,33 @@ def test_fills_that_overlap_are_one(drawn: str, inside: list[bool], tmp_path: Pa
     assert find_inside(points, read_outlines(path), 1e-9) == inside
 
 
+@pytest.mark.parametrize(
+    ("drawn", "inside"),
+    [
+        ("M0 0h40v40H0zM10 10h20v20H10z", True),  # wound twice
+        ("M0 0h40v40H0zM10 10v20h20V10z", False),  # once either way
+        ('M0 0h40v40H0zM10 10h20v20H10z" fill-rule="evenodd', False),
+        ('M0 0h40v40H0zM10 10h20v20H10z" style="fill-rule: evenodd', False),
+        ("M0 0h40v40H0zh40v40H0z", True),
+    ],
+)
+def test_a_fill_has_the_holes_of_its_rule(drawn: str, inside: bool, tmp_path: Path) -> None:
+    """Draws a square in a square, of which the middle is or is not filled."""
+    path = tmp_path / "l.svg"
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg"><path d="{drawn}"/></svg>')
+    points = [(20.0, -20.0), (7.0, -20.0), (50.0, -2.0)]
+    assert find_inside(points, read_outlines(path), 1e-9) == [inside, True, False]
+
+
+def test_a_fill_that_crosses_itself_without_end_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "star.svg"
+    angle = 2 * np.pi * 400 / 801 * np.arange(801)
+    corners = " ".join(f"{x:.6f},{y:.6f}" for x, y in np.stack([np.cos(angle), np.sin(angle)], 1))
+    path.write_text(f'<svg xmlns="http://www.w3.org/2000/svg"><polygon points="{corners}"/></svg>')
+    with refused("a fill crosses itself too often"):
+        read_outlines(path)
+
+
 @cases("problem", "hidden")
 def test_what_is_not_seen_is_no_shape(hidden: str, tmp_path: Path) -> None:
     """As the frame of an icon: it is seen neither before nor after what is."""
