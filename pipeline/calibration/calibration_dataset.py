@@ -16,6 +16,7 @@ from pipeline.calibration.experiments import DecayTest, Experiment
 from pipeline.calibration.fit_uncertainty import estimate_errors
 from pipeline.calibration.inputs import UNITS, WRITTEN, ConstantName, Constants
 from pipeline.calibration.least_squares import Fit
+from pipeline.datasets import SYNTHETIC_LABEL
 from sim.core import Floats
 
 
@@ -96,8 +97,9 @@ def material_fragment(fit: Fit, found: Estimate, title: str, *, synthetic: bool)
             found.names, found.low, found.high, found.status, strict=True
         )
     }
+    mark = [f"# {SYNTHETIC_LABEL}: found from computed data, not from a specimen."]
     lines = [
-        *(["# SYNTHETIC: found from computed data, not from a specimen."] if synthetic else []),
+        *(mark if synthetic else []),
         f"# {title or 'Calibration'}: lay it over the keys of a problem file.",
         "material:",
         f"  density: {here.material.density * 1e9:.6g} kg/m^2",

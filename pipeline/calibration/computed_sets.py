@@ -21,14 +21,14 @@ from pipeline.calibration.inputs import (
     source_files,
     start_constants,
 )
-from pipeline.datasets import provenance
+from pipeline.datasets import SYNTHETIC_LABEL, provenance
 from pipeline.problem.fields import named_files
 from pipeline.problem.reading import yaml_file
 from pipeline.runtime import write_atomically
 from sim.core import Floats
 from sim.structure import unrotated_inertia
 
-LABEL = "SYNTHETIC: computed, not measured"
+LABEL = f"{SYNTHETIC_LABEL}: computed, not measured"
 YAML = "calibration.yaml"
 
 

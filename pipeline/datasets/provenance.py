@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 COMMIT_FILE = "COMMIT"
 """Names the commit of sources that were published without their history."""
+SYNTHETIC_LABEL = "SYNTHETIC"
+"""Stands wherever data are shown that were computed or rendered, not measured or filmed."""
 PACKAGES = ("jax", "jaxlib", "netCDF4", "numpy", "piqp", "scipy", "shapely", "xarray")
 
 

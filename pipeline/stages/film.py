@@ -8,10 +8,10 @@ from pathlib import Path
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.datasets import provenance
+from pipeline.datasets import SYNTHETIC_LABEL, provenance
 from pipeline.problem.sections import VirtualRecording, write_quantity
 from pipeline.runtime import UserError, cli, found_in, sidecar_path, write_atomically
-from pipeline.tracking.frames import SYNTHETIC_LABEL, Recording
+from pipeline.tracking.frames import Recording
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import outlines_of_design
 from pipeline.virtual_lab import (

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.datasets import provenance
+from pipeline.datasets import SYNTHETIC_LABEL, provenance
 from pipeline.runtime import (
     PREFIX,
     UserError,
@@ -22,7 +22,6 @@ from pipeline.runtime import (
 )
 from pipeline.tracking.detect import specimen_orientation
 from pipeline.tracking.frames import (
-    SYNTHETIC_LABEL,
     VIDEOS,
     Frame,
     LoadCellLog,

@@ -15,7 +15,7 @@ from pipeline.calibration.inputs import (
     has_synthetic,
 )
 from pipeline.calibration.population import BEYOND, draw_constants, validate_population
-from pipeline.datasets import provenance
+from pipeline.datasets import SYNTHETIC_LABEL, provenance
 from pipeline.problem.fields import Section, named_files
 from pipeline.problem.reading import load_section
 from pipeline.runtime import write_atomically
@@ -69,8 +69,9 @@ def _constants(args: argparse.Namespace) -> None:
     drawn = draw_constants(asked, args.file.parent, args.count)
     files = {args.file.name: args.file, **named_files(asked, args.file.parent)}
     source, synthetic = asked.source, has_synthetic(asked.data, args.file.parent)
+    mark = [f"# {SYNTHETIC_LABEL}: found from computed data, not from specimens"]
     lines = [
-        *(["# SYNTHETIC: found from computed data, not from specimens"] if synthetic else []),
+        *(mark if synthetic else []),
         f"# Constants of new samples, drawn from what {args.file.name} finds of those measured",
         f"# Measured by {source.by}. {source.reference}",
         f"# Licence: {source.licence}. Made by python -m pipeline validate constants",

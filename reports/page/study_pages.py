@@ -10,6 +10,7 @@ from typing import Any
 import xarray as xr
 from matplotlib.figure import Figure
 
+from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.posing import altered_lattice_of, flat_vertices, soft_units
 from pipeline.problem import Problem, canonical_json, content_hash
 from reports.base import Table
@@ -18,7 +19,7 @@ from reports.page import citation
 from reports.page.report import Report
 from reports.panels import Animation, payload, quantisation_error
 from reports.paper_figures import movies_of
-from reports.study import LABEL, StudyResults
+from reports.study import StudyResults
 
 LARGEST_PAGE = 6_000_000
 """Bytes that a page may have."""
@@ -126,7 +127,7 @@ def study_page(
         "draft": draft,
         "warnings": list(dict.fromkeys(line for study in several for line in _warnings(study))),
         "recordings": recordings,
-        "synthetic": LABEL if any(each.synthetic for each in recordings) else "",
+        "synthetic": SYNTHETIC_LABEL if any(each.synthetic for each in recordings) else "",
         "claims": judged,
         "verdict": claims.verdict(judged),
         "quoted": claims.quoted(judged),

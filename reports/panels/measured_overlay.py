@@ -11,9 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from pipeline.datasets import SYNTHETIC_LABEL
 from reports.base import prose, style
 from reports.panels.animation_data import AnimationClip
-from reports.study import LABEL, RecordedMotion, from_dataset
+from reports.study import RecordedMotion, from_dataset
 from sim.core import Floats
 
 MARKERS = 22
@@ -40,10 +41,10 @@ def handles(recordings: Sequence[RecordedMotion]) -> list[Artist]:
     """Tells what a legend tells of continuous and dashed lines, and of bands."""
     if not recordings:
         return []
-    words = "experiment" + (f" ({LABEL})" if any(each.synthetic for each in recordings) else "")
+    mark = f" ({SYNTHETIC_LABEL})" if any(each.synthetic for each in recordings) else ""
     dashed = Line2D(
         [], [], color=style.GREY, lw=0.8, ls=_DASHES, marker="o", ms=2.0, mfc="white", mew=0.6,
-        label=words,
+        label=f"experiment{mark}",
     )  # fmt: skip
     lines: list[Artist] = [Line2D([], [], color=style.GREY, lw=1.2, label="simulation"), dashed]
     shade = Patch(color=style.GREY, alpha=0.3, lw=0, label="prediction band")
@@ -95,5 +96,5 @@ def caption(recordings: Sequence[RecordedMotion], place: str = "") -> str:
         return ""
     told = [*["snapshots"] * bool(place), "experiment"]
     told += ["synthetic"] * any(each.synthetic for each in recordings)
-    words = {"label": LABEL, "level": 100 * recordings[0].level, "place": place}
+    words = {"label": SYNTHETIC_LABEL, "level": 100 * recordings[0].level, "place": place}
     return "".join(f" {_PROSE[name].format_map(words)}" for name in told)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pipeline import datasets
 from pipeline.calibration.inputs import WRITTEN
-from pipeline.tracking.frames import SYNTHETIC_LABEL
+from pipeline.datasets import SYNTHETIC_LABEL
 from reports.base import style
 from reports.page import Report, publish
 

@@ -1,6 +1,5 @@
 from . import draft as draft
 from . import study_results as study_results
-from .recorded_motion import LABEL as LABEL
 from .recorded_motion import RecordedMotion as RecordedMotion
 from .recorded_motion import takes as takes
 from .report_scene import ReportScene as ReportScene

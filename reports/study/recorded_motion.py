@@ -7,11 +7,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.problem import Problem
 from sim.core import Floats
-
-LABEL = "SYNTHETIC"
-"""Stands wherever a motion is shown that was rendered and not filmed."""
 
 _UNLOADING = 2
 _BEYOND = 0.02
@@ -49,7 +47,7 @@ class RecordedMotion:
     @property
     def source(self) -> str:
         """Tells what a figure calls it."""
-        words = f"experiment ({LABEL})" if self.synthetic else "experiment"
+        words = f"experiment ({SYNTHETIC_LABEL})" if self.synthetic else "experiment"
         return f"{words}, take {self.take}" if self.take else words
 
     def values(self, variable: xr.DataArray) -> Floats:

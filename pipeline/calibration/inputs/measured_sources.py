@@ -7,9 +7,9 @@ from pipeline import datasets, problem
 from pipeline.calibration.inputs.description import Calibration, MeasurementSet, TrackedMotion
 from pipeline.calibration.inputs.load_cycles import CycleRecord
 from pipeline.calibration.inputs.population import SampleTest
+from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.problem.fields import csv_columns, named_files
 
-_SYNTHETIC = "SYNTHETIC"
 """Stands above the numbers of a CSV that was computed, or is of a rendered video."""
 
 
@@ -46,4 +46,4 @@ def has_synthetic(sets: Iterable[MeasurementSet | SampleTest | CycleRecord], fol
 def _is_synthetic(each: MeasurementSet | SampleTest | CycleRecord, path: Path) -> bool:
     if isinstance(each, TrackedMotion) or path.suffix == ".nc":
         return datasets.read_attributes(path).get("synthetic") == "yes"
-    return any(_SYNTHETIC in line for line in csv_columns.read_preamble(path))
+    return any(SYNTHETIC_LABEL in line for line in csv_columns.read_preamble(path))

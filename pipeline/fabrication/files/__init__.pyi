@@ -1,2 +1,2 @@
-from .drawing_files import COLOURS as COLOURS
+from .drawing_files import LAYER_COLOURS as LAYER_COLOURS
 from .package_folder import PackageFolder as PackageFolder

@@ -23,7 +23,7 @@ APPLICATION = "METACLOAK"
 
 LAYERS = {"CUT_INNER": 5, "CUT_OUTER": 7, "ENGRAVE": 3, "SCORE": 1, "REFERENCE": 8}
 """Layers and their AutoCAD colours: blue, black or white, green, red, grey."""
-COLOURS = {
+LAYER_COLOURS = {
     "REFERENCE": "#808080",
     "ENGRAVE": "#00a000",
     "SCORE": "#ff0000",
@@ -101,7 +101,7 @@ def write_svg(sheet: LaserSheet, path: Path) -> None:
         f' width="{width}mm" height="{height}mm" viewBox="0 0 {width} {height}">\n'
         f"<title>{sheet.name}</title>\n"
     )
-    body = "".join(_layer(name, sheet) for name in COLOURS)
+    body = "".join(_layer(name, sheet) for name in LAYER_COLOURS)
     path.write_text(f"{head}{body}</svg>\n", encoding="utf-8", newline="\n")
 
 
@@ -111,7 +111,7 @@ def _layer(name: str, sheet: LaserSheet) -> str:
         return ""
     return (
         f'<g id="{name}" inkscape:groupmode="layer" inkscape:label="{name}" fill="none"'
-        f' stroke="{COLOURS[name]}" stroke-width="{_HAIRLINE}">\n'
+        f' stroke="{LAYER_COLOURS[name]}" stroke-width="{_HAIRLINE}">\n'
         + "".join(f"{shape}\n" for shape in shapes)
         + "</g>\n"
     )

@@ -11,7 +11,6 @@ from .picture_folder import pictures as pictures
 from .recording import LoadCellLog as LoadCellLog
 from .recording import Recording as Recording
 from .recording import load_recording as load_recording
-from .video import SYNTHETIC_LABEL as SYNTHETIC_LABEL
 from .video import VIDEOS as VIDEOS
 from .video import frame_count as frame_count
 from .video import open_video as open_video

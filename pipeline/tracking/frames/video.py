@@ -8,14 +8,12 @@ from pathlib import Path
 
 import av
 
+from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.runtime import UserError
 from pipeline.tracking.frames.decoded_picture import Orientation, Shades, orientation
 from pipeline.tracking.frames.frame import Frame, broken_off
 from pipeline.tracking.frames.frame_times import FrameClock, goes_on, promised_count, stream_length
 from pipeline.tracking.frames.picture_folder import pictures, read_folder
-
-SYNTHETIC_LABEL = "SYNTHETIC"
-"""Stands in the title or comment of a video that was rendered."""
 
 _KINDS = {
     ".mp4": "mov",

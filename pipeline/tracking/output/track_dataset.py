@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.datasets.tables import TABLES
 from pipeline.runtime import write_atomically
 from pipeline.tracking.motion import Track
@@ -157,7 +158,7 @@ def write_track_table(track: xr.Dataset, path: Path) -> None:
     there = np.flatnonzero((quality != flags["absent"]).any(axis=0))
     with write_atomically(path) as aside, aside.open("w", encoding="utf-8", newline="\n") as file:
         if track.attrs["synthetic"] == "yes":
-            file.write("# SYNTHETIC: of a rendered video\n")
+            file.write(f"# {SYNTHETIC_LABEL}: of a rendered video\n")
         file.write(",".join(["time_s", "unit", "i", "j", *_NUMBERS, *_LOADS, "quality"]) + "\n")
         for frame, time in enumerate(track["time"].values):
             load = _cells(loads[frame])

@@ -62,7 +62,7 @@ def report(args: argparse.Namespace) -> None:
     values = {
         "title": f"{titled(asked, args.problem)}: what is built",
         "lead": "Drawings for the laser cutter, plates for the printer, fixtures and papers.",
-        "pens": list(pictures.PENS.items()),
+        "pens": list(pictures.LAYER_COLOURS.items()),
         "structures": made,
         "as_built": list(as_built(asked, {each["name"]: read_manifest(p) for each, p in packages})),
         "parameters": list(parameters(asked.fabrication.model_dump(mode="json"))),

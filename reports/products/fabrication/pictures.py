@@ -12,16 +12,13 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
-from pipeline.fabrication.files import COLOURS
+from pipeline.fabrication.files import LAYER_COLOURS
 from pipeline.fabrication.readback import Curve, MeshBody, read_3mf, read_drawing, read_stl
 from reports.base import GREY, MM_PER_INCH, PALE, style
 from reports.products.fabrication.renderer import Body, picture
 
 WIDTH = 1000
 """Of a picture in pixels."""
-
-PENS = COLOURS
-"""Colours of the layers, those of the files, in the order of drawing."""
 
 _RIM = 6.0  # mm around a sheet
 _BED = "#e6e8ea"
@@ -38,7 +35,7 @@ def sheet(path: Path) -> bytes:
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_axis_off()
-    for layer in PENS:
+    for layer in LAYER_COLOURS:
         _draw(axes, layer, [curve for curve in drawing.curves if curve.layer == layer])
     stream = io.BytesIO()
     figure.savefig(stream, format="png", metadata={"Software": None})
@@ -49,15 +46,15 @@ def _draw(axes: Axes, layer: str, curves: list[Curve]) -> None:
     """Draws one layer; outer cuts are filled, holes are white."""
     closed = [curve.points for curve in curves if curve.closed]
     fill = {"CUT_OUTER": PALE, "CUT_INNER": "white"}.get(layer, "none")
-    order = list(PENS).index(layer) if layer != "CUT_OUTER" else 0.5
+    order = list(LAYER_COLOURS).index(layer) if layer != "CUT_OUTER" else 0.5
     axes.add_collection(
         PolyCollection(
-            closed, facecolors=fill, edgecolors=PENS[layer], linewidths=0.9, zorder=order
+            closed, facecolors=fill, edgecolors=LAYER_COLOURS[layer], linewidths=0.9, zorder=order
         )
     )
     strokes = [curve.points for curve in curves if not curve.closed]
     axes.add_collection(
-        LineCollection(strokes, colors=PENS[layer], linewidths=0.9, zorder=order + 1)
+        LineCollection(strokes, colors=LAYER_COLOURS[layer], linewidths=0.9, zorder=order + 1)
     )
 
 

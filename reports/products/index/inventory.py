@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from pipeline.datasets import file_hash, read_attributes
+from pipeline.datasets import SYNTHETIC_LABEL, file_hash, read_attributes
 from pipeline.runtime import UserError
 from reports.facts import Fact
 from reports.facts import fact_records as facts
@@ -161,7 +161,7 @@ def _around(folder: Path, results: Path, faults: list[UserError]) -> list[Link]:
 
 def _recording(page: Path, results: Path) -> Link:
     track = read_attributes(page.parent / "track.nc")
-    note = "SYNTHETIC" if track["synthetic"] == "yes" else ""
+    note = SYNTHETIC_LABEL if track["synthetic"] == "yes" else ""
     return Link(_seen(page, results), f"recording “{page.parent.name}”", note)
 
 

@@ -3,12 +3,13 @@
 import argparse
 from collections.abc import Iterator, Sequence
 
+from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.problem.sections import Codec
 from pipeline.runtime import cli
 from pipeline.virtual_lab import encode_video
 from reports.figures import kinds
 from reports.products.movie.frames import RATE, images
-from reports.study import LABEL, StudyResults, study_results
+from reports.study import StudyResults, study_results
 from sim.core import Image
 
 
@@ -36,5 +37,5 @@ def _frames(name: str, studies: Sequence[StudyResults], bar: cli.progress) -> It
 
 def _note(studies: Sequence[StudyResults]) -> str:
     if any(each.synthetic for study in studies for each in study.recordings):
-        return f"{LABEL}: what is called experiment was rendered and tracked, not filmed."
+        return f"{SYNTHETIC_LABEL}: what is called experiment was rendered and tracked, not filmed."
     return ""

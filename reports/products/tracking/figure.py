@@ -9,7 +9,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from pipeline.tracking.frames import SYNTHETIC_LABEL
+from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.tracking.geometry import SpecimenOutlines
 from reports.base import style
 from reports.products.tracking.overlay import of_track

@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.colors import Colormap, to_rgb
 from numpy.typing import NDArray
 
+from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.runtime import UserError
 from pipeline.tracking.frames import Frame
 from pipeline.tracking.geometry import Camera, SpecimenOutlines, camera_of, outlines_of_design
@@ -62,7 +63,7 @@ def painter(track: xr.Dataset, shown: str) -> Painter:
         _palette(colours),
         (-most if shown == "rotation" else 0.0, most),
         label,
-        "SYNTHETIC" if track.attrs["synthetic"] == "yes" else "",
+        SYNTHETIC_LABEL if track.attrs["synthetic"] == "yes" else "",
         2 if max(camera.size) < _LARGE else 1,
     )
 

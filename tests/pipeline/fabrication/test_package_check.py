@@ -19,7 +19,7 @@ from pipeline.fabrication.checks.assembled_specimen import unit_sections
 from pipeline.fabrication.checks.bill_checks import check_bill
 from pipeline.fabrication.checks.package_record import PackageRecord, expected_parts
 from pipeline.fabrication.checks.sheet_checks import check_scale
-from pipeline.fabrication.files.drawing_files import COLOURS, write_dxf, write_svg
+from pipeline.fabrication.files.drawing_files import LAYER_COLOURS, write_dxf, write_svg
 from pipeline.fabrication.papers import BILL, MANIFEST, read_bill
 from pipeline.fabrication.plates import LaserSheet
 from pipeline.fabrication.readback import Drawing, faults, read_drawing, read_stl
@@ -310,8 +310,8 @@ def test_a_drawing_says_how_far_it_extends(tmp_path: Path, version: DxfVersion) 
 def test_the_rim_of_a_sheet_is_on_a_layer_that_is_not_plotted(tmp_path: Path) -> None:
     write_dxf(LaserSheet("empty", (600.0, 300.0), ()), tmp_path / "empty.dxf")
     layers = readfile(tmp_path / "empty.dxf").layers
-    plotted = {name: layers.get(name).dxf.plot for name in COLOURS}
-    assert plotted == {name: int(name != "REFERENCE") for name in COLOURS}
+    plotted = {name: layers.get(name).dxf.plot for name in LAYER_COLOURS}
+    assert plotted == {name: int(name != "REFERENCE") for name in LAYER_COLOURS}
 
 
 def test_a_sheet_in_fractions_of_an_inch_is_as_large_as_asked_for(tmp_path: Path) -> None:

@@ -9,8 +9,8 @@ import av
 import numpy as np
 import pytest
 
+from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.tracking.frames import (
-    SYNTHETIC_LABEL,
     BrokenOffError,
     read_frames,
     rendered,

@@ -5,8 +5,7 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.datasets import provenance
-from pipeline.tracking.frames import SYNTHETIC_LABEL
+from pipeline.datasets import SYNTHETIC_LABEL, provenance
 from reports.__main__ import main
 from reports.base import style
 from reports.products.calibration import draw_calibration

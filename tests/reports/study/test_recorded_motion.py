@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.runtime import UserError
 from reports.base import style
 from reports.facts import Fact
@@ -12,7 +13,7 @@ from reports.figures import kinds
 from reports.figures.study_report import study_report
 from reports.page import rendered
 from reports.panels import payload
-from reports.study import LABEL, StudyResults
+from reports.study import StudyResults
 from reports.study.study_results import load
 from tests.reports import compressed_study, figure_assertions, recorded_study
 from tests.reports.panels.test_animation_data import decoded
@@ -49,7 +50,7 @@ def test_figures_show_experiments_above_and_dashed(name: str, figures: dict[str,
     made = figures[name]
     figure_assertions.assert_legible(made)
     places = {text.get_text(): text.get_position() for text in figure_assertions.texts(made)}
-    labels = [text for text in places if LABEL in text and "\n" in text]
+    labels = [text for text in places if SYNTHETIC_LABEL in text and "\n" in text]
     assert len(labels) >= 2
     for label in labels:
         beside = f"{label.splitlines()[0]}\nsimulation"
@@ -97,7 +98,7 @@ def test_measured_motions_are_told(filmed: dict[str, StudyResults]) -> None:
         value = shaken[f"peak_to_peak_{name}"].value
         measured = shaken[f"measured_peak_to_peak_{name}"]
         assert measured.value == pytest.approx(recorded_study.GAIN * value, rel=0.02)
-        assert LABEL in measured.note
+        assert SYNTHETIC_LABEL in measured.note
     assert shaken["measured_peak_to_peak_reduction"].value == pytest.approx(88.0, abs=0.1)
     for key in ("rotation_altered", "rotation_cloaked_most"):
         expected = pytest.approx(recorded_study.GAIN * shield[key].value, rel=0.02)
@@ -110,14 +111,17 @@ def test_measured_motions_are_told(filmed: dict[str, StudyResults]) -> None:
     found = facts(study)
     assert found["altered_0_rmse_ux"].value == 0.5
     assert found["altered_0_frames"].value == len(study.recordings[0].along)
-    assert found["altered_0_correlation"].group == f"Recording “altered_0”: experiment ({LABEL})"
+    assert (
+        found["altered_0_correlation"].group
+        == f"Recording “altered_0”: experiment ({SYNTHETIC_LABEL})"
+    )
 
 
 def test_the_player_shows_it_and_the_residual(filmed: dict[str, StudyResults]) -> None:
     study = filmed["study"]
     data = payload(kinds.kind_of(study.problem).animation(study))
     names = [clip["name"] for clip in data["structures"]]
-    assert names[:2] == [f"Altered, experiment ({LABEL})", "Altered"]
+    assert names[:2] == [f"Altered, experiment ({SYNTHETIC_LABEL})", "Altered"]
     cases = data["motion"][0]
     assert [case is not None for case in cases] == [False, True, False, False]
     assert data["residual"][1] == []
@@ -136,10 +140,10 @@ def test_the_player_shows_it_and_the_residual(filmed: dict[str, StudyResults]) -
 def test_pages_say_that_it_is_synthetic_unless_filmed(filmed: dict[str, StudyResults]) -> None:
     study = filmed["smile"]
     html = rendered(study_report(study), {})
-    assert f"<b>{LABEL}</b>: these recordings were rendered" in html
-    assert html.count(f" <strong>{LABEL}</strong></li>") == len(study.recordings) > 1
+    assert f"<b>{SYNTHETIC_LABEL}</b>: these recordings were rendered" in html
+    assert html.count(f" <strong>{SYNTHETIC_LABEL}</strong></li>") == len(study.recordings) > 1
     real = {name: data.assign_attrs(synthetic="no") for name, data in study.compared.items()}
-    assert LABEL not in rendered(study_report(replace(study, compared=real)), {})
+    assert SYNTHETIC_LABEL not in rendered(study_report(replace(study, compared=real)), {})
 
 
 def test_only_the_way_there_is_shown_of_a_load(filmed: dict[str, StudyResults]) -> None:
