@@ -128,14 +128,14 @@ def quoted(found: Sequence[JudgedClaim]) -> bool:
     return any(each.claim.ours is None for each in found)
 
 
-def verdict(found: Sequence[JudgedClaim]) -> str:
-    """Tells how many claims hold, in one line."""
+def verdict(found: Sequence[JudgedClaim], label: str = "") -> str:
+    """Tells how many claims hold, in one line; `label` marks an experiment that was rendered."""
     simulated = [each.simulation.status for each in found]
     both = [each for each in found if each.claim.of == "both"]
     measured = [each.experiment.status for each in both]
     parts = [f"{_counted(simulated)} in simulation"]
     if both:
-        parts.append(f"{_counted(measured)} in experiment")
+        parts.append(f"{_counted(measured)} in experiment" + f" ({label})" * bool(label))
         parts.append(f"{_counted([each.both for each in both])} in both")
     return "Claims that hold: " + ", ".join(parts) + "."
 

@@ -104,6 +104,7 @@ def study_page(
     claimed = text.claimed or (studies[""].target if single else name)
     judged = [] if draft else claims.judged(claimed, facts)
     recordings = studies[""].recordings if single else []
+    synthetic = SYNTHETIC_LABEL if any(each.synthetic for each in recordings) else ""
     targets = [together[0]] if together else [study.target for study in several]
     problems = {study.name: study.problem for study in several}
     asked = studies[""].problem if single else together and together[1]
@@ -127,9 +128,9 @@ def study_page(
         "draft": draft,
         "warnings": list(dict.fromkeys(line for study in several for line in _warnings(study))),
         "recordings": recordings,
-        "synthetic": SYNTHETIC_LABEL if any(each.synthetic for each in recordings) else "",
+        "synthetic": synthetic,
         "claims": judged,
-        "verdict": claims.verdict(judged),
+        "verdict": claims.verdict(judged, synthetic),
         "quoted": claims.quoted(judged),
         "citations": citation.citations(),
     }

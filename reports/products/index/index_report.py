@@ -71,7 +71,9 @@ def tables(built: Sequence[BuiltReport]) -> list[dict[str, Any]]:
         own = by_name.get(name)
         judged = claims.judged(name, own.facts if own else [])
         about = {"name": name, "title": f"Figure {name.removeprefix('fig')}", "built": own}
-        made.append(about | {"claims": judged, "verdict": claims.verdict(judged)})
+        label = own.label if own else ""
+        told = {"verdict": claims.verdict(judged, label), "synthetic": label}
+        made.append(about | {"claims": judged} | told)
     return made
 
 

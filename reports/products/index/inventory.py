@@ -51,6 +51,7 @@ class BuiltDataset:
     sha256: str
     commit: str
     problem: str
+    synthetic: bool
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,11 @@ class BuiltReport:
     def figure(self) -> bool:
         """Tells whether it is a figure of the paper, and not a variant or another study."""
         return FIGURE.fullmatch(self.name) is not None
+
+    @property
+    def label(self) -> str:
+        """Marks a report whose experiment was rendered; empty of any other."""
+        return SYNTHETIC_LABEL if any(each.synthetic for each in self.datasets) else ""
 
 
 def reports(results: Path, faults: list[UserError] | None = None) -> list[BuiltReport]:
@@ -169,7 +175,11 @@ def _dataset(file: Path, results: Path) -> BuiltDataset:
     found = read_attributes(file)
     about = {key: str(found.get(key, "")) for key in ("git_commit", "problem_hash")}
     return BuiltDataset(
-        _seen(file, results), file_hash(file), about["git_commit"], about["problem_hash"]
+        address=_seen(file, results),
+        sha256=file_hash(file),
+        commit=about["git_commit"],
+        problem=about["problem_hash"],
+        synthetic=found.get("synthetic") == "yes",
     )
 
 

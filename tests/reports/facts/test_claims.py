@@ -98,8 +98,10 @@ def test_multiples_of_the_spacing_are_lengths_other_units_refused() -> None:
         found(replace(ROTATION, unit="rad"))
 
 
-def test_the_verdict_counts() -> None:
-    words = claims.verdict(claims.judged("fig4", [ROTATION]))
+def test_the_verdict_counts_and_bears_the_label() -> None:
+    judged = claims.judged("fig4", [ROTATION])
+    assert "in experiment (SYNTHETIC), 0 of 3" in claims.verdict(judged, "SYNTHETIC")
+    words = claims.verdict(judged)
     assert words == (
         "Claims that hold: 1 of 9 (8 not yet evaluated) in simulation, 0 of 3 (3 not yet "
         "evaluated) in experiment, 0 of 3 (3 not yet evaluated) in both."

@@ -1,11 +1,12 @@
 import base64
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from pipeline.datasets import seal
+from pipeline.datasets import SYNTHETIC_LABEL, seal
 from reports.__main__ import main
 from reports.page import templating
 from reports.products.index import index_report, inventory
@@ -62,6 +63,32 @@ def test_figures_come_first_drafts_are_marked_claims_judged(results: Path, html:
     assert "<code>make fig7</code> builds it" in html
     tables = {table["name"]: table for table in index_report.tables(())}
     assert all(each.simulation.why == "study not built" for each in tables["fig2"]["claims"])
+
+
+@pytest.mark.parametrize("label", [SYNTHETIC_LABEL, ""])
+def test_experiments_that_were_rendered_are_marked(label: str, results: Path) -> None:
+    built = inventory.reports(results)[0]
+    comparison = replace(built.datasets[0], synthetic=bool(label))
+    shown = replace(built, datasets=[*built.datasets, comparison])
+    assert shown.label == label
+    values = index_report.shown(results)
+    values |= {"figures": [(shown, "")], "tables": index_report.tables([shown])}
+    html = templating.rendered("index.html.j2", values)
+    mark = f" ({label})" if label else ""
+    assert f'<th scope="col">Experiment{mark}</th>' in html
+    assert f'data-label="Experiment{mark}"' in html
+    assert f"in experiment{mark}, " in html
+    assert ('<p class="tag">SYNTHETIC: what is called experiment' in html) is bool(label)
+    assert (SYNTHETIC_LABEL in html) is bool(label)
+
+
+@pytest.mark.parametrize("synthetic", ["yes", "no"])
+def test_datasets_say_whether_they_were_rendered(
+    synthetic: str, results: Path, study: StudyResults, tmp_path: Path
+) -> None:
+    made = Path(shutil.copytree(results, tmp_path / "results"))
+    study.response.assign_attrs(synthetic=synthetic).to_netcdf(made / RESPONSE)
+    assert inventory.reports(made)[0].label == (SYNTHETIC_LABEL if synthetic == "yes" else "")
 
 
 def test_an_empty_folder_has_an_index_too(tmp_path: Path) -> None:
