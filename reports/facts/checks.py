@@ -11,18 +11,20 @@ from pipeline.problem import Problem
 from reports.facts import foil, measures
 from reports.facts.fact_records import Fact, facts_of, percent, within, worded
 from reports.facts.formulas import weighted_force
-from reports.study import RigidUnits, display_name, evaluation_count
+from reports.study import RigidUnits, angle_budget, display_name, evaluation_count
 from sim.core import instruction_set
 
 JUMPED = 2
 """Least flag of a stable state that the path came to by a jump or on a branch."""
+
+_SINCE = "; both counted from the end of those by the angle law"
 
 _told = facts_of(__file__)
 
 
 def history_facts(problem: Problem, design: xr.Dataset) -> Iterator[Fact]:
     """Yields evaluations, best feasible loss and optimality of every method, and of descents."""
-    unit = design["best_loss"].attrs["units"]
+    before, unit = angle_budget(problem), design["best_loss"].attrs["units"]
     if problem.optimiser.angle is not None:
         yield from _first_fact(problem, problem.optimiser.angle.evaluations)
     for method in design["method"].values:
@@ -30,20 +32,29 @@ def history_facts(problem: Problem, design: xr.Dataset) -> Iterator[Fact]:
         loss, at = history["loss"].values, int(history["best_evaluation"])
         count, best = evaluation_count(history), float(history["best_loss"])
         soon = measures.first_within(loss, best, 0.9)
-        yield _told("evaluations_{method}", count, at=at, soon=soon, **of)
+        since = _SINCE if before and method == "sqp" else ""
+        yield _told("evaluations_{method}", count, at=at, soon=soon, since=since, **of)
         note = "shipped" if method == design.attrs.get("shipped_method") else "not shipped"
         note += weighted_force(problem)
         yield _told("best_{method}", best, unit=unit, note=note, **of)
         violation = float(history["violation"].isel(evaluation=at))
         yield _told("violation_{method}", violation, **of)
         yield _told("kkt_{method}", float(history["kkt_residual"]), **of)
+    yield from _descent_facts(problem, design, unit)
+
+
+def _descent_facts(problem: Problem, design: xr.Dataset, unit: str) -> Iterator[Fact]:
+    """Yields the spread of the losses of several descents, and what all of them cost."""
     descents = json.loads(design.attrs["plan"]).get("descents", [])
     if len(descents) > 1:
-        losses = [each for each in descents if each is not None]
+        sqp = problem.optimiser.methods.sqp
+        each = angle_budget(problem) + (sqp.evaluations if sqp is not None else 0)
+        of = {"count": len(descents), "each": each, "all": each * len(descents)}
+        losses = [loss for loss in descents if loss is not None]
         words = f"{worded(min(losses), unit, 3)} to {worded(max(losses), unit, 3)}"
         if without := len(descents) - len(losses):
             words += f"; {without} without a design"
-        yield _told("descents", max(losses) / min(losses), words, count=len(descents))
+        yield _told("descents", max(losses) / min(losses), words, **of)
 
 
 def _first_fact(problem: Problem, evaluations: int) -> Iterator[Fact]:

@@ -19,5 +19,7 @@ from .rigid_units import on_lattice as on_lattice
 from .rigid_units import unit_at as unit_at
 from .study_results import RedesignResults as RedesignResults
 from .study_results import StudyResults as StudyResults
+from .study_results import angle_budget as angle_budget
 from .study_results import display_name as display_name
 from .study_results import evaluation_count as evaluation_count
+from .study_results import undrawn_evaluations as undrawn_evaluations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -25,6 +26,19 @@ from reports.study.report_scene import ReportScene
 def evaluation_count(design: xr.Dataset) -> int:
     """Counts the evaluations of a design, or of one of its methods, those that failed as well."""
     return int(np.isfinite(design["violation"]).sum())
+
+
+def angle_budget(problem: Problem) -> int:
+    """Returns the evaluations by the angle law that come before a descent, at most; 0 if none."""
+    first = problem.optimiser.angle
+    asked = problem.contact.law == "geometric" and problem.optimiser.methods.sqp is not None
+    return first.evaluations if asked and first is not None else 0
+
+
+def undrawn_evaluations(problem: Problem, design: xr.Dataset) -> tuple[int, int]:
+    """Returns evaluations by the angle law before the history of SQP, and descents beside it."""
+    descents = json.loads(design.attrs["plan"]).get("descents", [])
+    return angle_budget(problem), max(0, len(descents) - 1)
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ from reports.panels import (
     structure_clip,
     with_recordings,
 )
-from reports.study import StudyResults, display_name
+from reports.study import StudyResults, display_name, undrawn_evaluations
 
 TALLEST_SNAPSHOTS = 116.0
 """Height that all snapshots may take, mm."""
@@ -85,8 +85,17 @@ def design_panels(
     design, history = tables.of_design(study)
     return [
         Panel(("a", "", 0.0, 0.8), at_rest, caption, [design]),
-        Panel(("b", "Optimisation", 123.0, 0.8), optimisation, _PROSE["history"], [history]),
+        Panel(("b", "Optimisation", 123.0, 0.8), optimisation, _history(study), [history]),
     ]
+
+
+def _history(study: StudyResults) -> str:
+    """Tells what is drawn of the optimisation, and what is not."""
+    before, beside = undrawn_evaluations(study.problem, study.design)
+    return str(_PROSE["history"]).format(
+        before=_PROSE["before"].format(count=before) if before else "",
+        beside=_PROSE["beside"].format(count=beside + 1) if beside else "",
+    )
 
 
 def _size(drive: Any) -> str:  # noqa: ANN401  (any drive that has an amplitude)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline import problem
+from pipeline.fabrication.files import LAYER_COLOURS
 from pipeline.fabrication.papers import DRAWN_TWICE, read_bill, read_manifest
 from pipeline.fabrication.parts import STRAIGHT, THIN_WALL
 from pipeline.posing import loss_units
@@ -62,7 +63,7 @@ def report(args: argparse.Namespace) -> None:
     values = {
         "title": f"{titled(asked, args.problem)}: what is built",
         "lead": "Drawings for the laser cutter, plates for the printer, fixtures and papers.",
-        "pens": list(pictures.LAYER_COLOURS.items()),
+        "pens": list(LAYER_COLOURS.items()),
         "structures": made,
         "as_built": list(as_built(asked, {each["name"]: read_manifest(p) for each, p in packages})),
         "parameters": list(parameters(asked.fabrication.model_dump(mode="json"))),

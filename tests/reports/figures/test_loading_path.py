@@ -350,3 +350,19 @@ def test_evaluations_by_angle(
     if told is not None:
         assert f"by the angle law of contact{told}" in notes[0]
         assert notes[0].endswith("; MMA does without") == (method == "both")
+
+
+def test_evaluations_that_are_not_drawn_are_told(smile: StudyResults) -> None:
+    """Adds a stage by the angle law, and two descents to that which is drawn."""
+    assert "not drawn" not in figure.loading_path_figure(smile).caption
+    asked = smile.problem.with_optimiser(angle=Method(evaluations=7))
+    plan = json.dumps({"descents": [0.1, 0.05, None]})
+    searched = changed(smile, "design", smile.design.assign_attrs(plan=plan))
+    searched = dataclasses.replace(searched, problem=law_comparison.under(asked, "geometric"))
+    told = figure.loading_path_figure(searched).caption
+    assert "up to 7 evaluations by the angle law of contact, which are not drawn." in told
+    assert "Of its 3 descents the best is drawn." in told
+    found = {fact.key: fact for fact in checks.history_facts(searched.problem, searched.design)}
+    assert "counted from the end of those by the angle law" in found["evaluations_sqp"].note
+    each = 7 + asked.optimiser.methods.chosen["sqp"].evaluations
+    assert f"up to {each} evaluations each, {3 * each} in all" in found["descents"].note
