@@ -98,7 +98,7 @@ def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Meas
         axes.plot(path.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label=f"{still}: zero")
     if (copied := banded_copies(study)) is not None:
         _bands(axes, study, path, measure, copied)
-    measured.bands(axes, study, measure.key)
+    measured.bands(axes, study, measure.key, names)
     measured.measured_curves(axes, study, path, measure.of, names)
     legend = axes.legend(loc="upper left", handlelength=1.2)
     room = min(_LINE * len(legend.get_texts()), _MOST_ROOM)
@@ -187,8 +187,9 @@ def contraction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
         return measures.contraction(study.problem, response)
 
     _plain_panel(axes, study.problem, path, of(study.response), "Contraction (mm)")
-    measured.bands(axes, study, "contraction")
-    measured.measured_curves(axes, study, path, of, structures(study.response))
+    names = structures(study.response)
+    measured.bands(axes, study, "contraction", names)
+    measured.measured_curves(axes, study, path, of, names)
     _sides(axes, study)
 
 

@@ -70,9 +70,11 @@ def has_bands(study: StudyResults, key: str) -> bool:
     return key in _NAMES and bool(study.recordings)
 
 
-def bands(axes: Axes, study: StudyResults, key: str) -> None:
-    """Draws prediction bands of a quantity, where comparisons have them."""
+def bands(axes: Axes, study: StudyResults, key: str, names: Collection[str]) -> None:
+    """Draws prediction bands of a quantity of these structures, where comparisons have them."""
     for each in study.recordings if has_bands(study, key) else ():
+        if each.structure not in names:
+            continue
         low, high = (each.values(_followed(each, key, "simulated", end)) for end in _ENDS)
         measured_overlay.band(axes, each.along, low, high, style.STRUCTURE_COLOURS[each.structure])
 

@@ -102,6 +102,17 @@ def test_recordings_are_placed_and_have_the_only_bands(smile: StudyResults, tmp_
     assert counts == [len(curves.DRAWN) + 1, 2]  # two sizes of geometry; one band a recording
 
 
+def test_bands_are_of_the_structures_that_are_drawn(smile: StudyResults, tmp_path: Path) -> None:
+    """Leave the intact one without, whose measure is zero; its contraction has a band."""
+    shown = recorded_study.with_recordings(smile, tmp_path, ("intact", 0), ("cloaked", 0))
+    path = abscissa.abscissa_of(smile.problem, smile.response)
+    measure = measures.measure_of(smile.problem)
+    first, second = (Figure().add_subplot() for _ in range(2))
+    curves.measure_panel(first, shown, path, measure)
+    curves.contraction_panel(second, shown, path)
+    assert [len(axes.collections) for axes in (first, second)] == [1, 2]
+
+
 def test_the_error_of_a_reaction_stands_beside_the_title(smile: StudyResults) -> None:
     path, axes = abscissa.abscissa_of(smile.problem, smile.response), Figure().add_subplot()
     curves.drive_panel(axes, smile, path)
