@@ -32,8 +32,6 @@ CASE_STYLES = (
     ((0, (5.0, 1.2, 1.2, 1.2)), 0.55),
 )
 """Dashes and share of white of the curves of one load case after the other."""
-DRAWN = ("geometry", "stiffness", "together")
-"""First words of the noises that there are bands of."""
 RIGHT_AXIS = 9.0
 """Room for the labels of an axis on the right, mm."""
 
@@ -148,7 +146,7 @@ def _bands(
     axes: Axes, study: StudyResults, path: Abscissa, measure: Measure, made: xr.Dataset
 ) -> None:
     """Draws the 5 % to 95 % percentiles of every kind of noise, laid over one another."""
-    made = made.sel(noise=_drawn(made))
+    made = made.sel(noise=monte_carlo.drawn_noises(made))
     along = np.interp([0.0, *made["time"].values], study.response["time"], path.values)
     values = monte_carlo.copy_curves(study.problem, measure, study.response, made)
     for noise in made["noise"].values:
@@ -157,14 +155,9 @@ def _bands(
         axes.fill_between(along, low, high, color=style.CLOAKED, alpha=0.18, lw=0, zorder=2)
 
 
-def _drawn(made: xr.Dataset) -> list[str]:
-    """Lists the noises that are drawn; others stand in the table alone."""
-    return [str(name) for name in made["noise"].values if str(name).split()[0] in DRAWN]
-
-
 def robustness_panel(axes: Axes, study: StudyResults, measure: Measure, made: xr.Dataset) -> None:
     """Draws the measure of path or motion: median and percentiles of kinds of noise."""
-    made = made.sel(noise=_drawn(made))
+    made = made.sel(noise=monte_carlo.drawn_noises(made))
     ends = measures.overall(study.problem, over_cases(study.problem, measure.of(study.response)))
     values = monte_carlo.copy_curves(study.problem, measure, study.response, made)
     found = copies.spreads(measures.overall(study.problem, values), made)

@@ -4,13 +4,14 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.problem.sections import Paper, single_drives
 from reports.base import Table, prose, style
 from reports.facts import JUMPED, Fact
-from reports.figures.loading_path import curves, measures, tables
+from reports.figures.loading_path import curves, measures, monte_carlo, tables
 from reports.figures.loading_path.abscissa import (
     LOADS,
     Abscissa,
@@ -135,7 +136,8 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
         yield "Lateral contraction", lambda axes: panel(axes, study, path), words, ()
     yield _answer(study, path)
     if (copies := study.scatter) is not None:
-        words = _PROSE["copies"].format(end=" at the end of the path" if path.static else "")
+        end = " at the end of the path" if path.static else ""
+        words = _PROSE["copies"].format(end=end, **_noises([copies]))
         told = "imperfect copies, one a line"
         table = Table("robustness.csv", told, tables.copies(study, copies))
         title = f"{copies['sample'].size} imperfect cloaks"
@@ -168,11 +170,18 @@ def _side_by_side(shown: Sequence[Curve], top: float) -> Iterator[Panel]:
 
 def marks(studies: Sequence[StudyResults]) -> str:
     """Tells what else is drawn with the curves of the measure, each after a semicolon."""
-    bands = any(curves.banded_copies(study) is not None for study in studies)
+    found = [curves.banded_copies(study) for study in studies]
+    banded = _noises([copies for copies in found if copies is not None])
     jumps = any((study.response["stability"] >= JUMPED).any() for study in studies)
     second = any(study.redesign is not None and study.redesign.changed for study in studies)
-    shown = {"bands": bands, "jumps": jumps, "second": second}
-    return "".join(_PROSE[name] for name, there in shown.items() if there)
+    shown = {"bands": banded["drawn"], "jumps": jumps, "second": second}
+    return "".join(_PROSE[name].format_map(banded) for name, there in shown.items() if there)
+
+
+def _noises(made: Sequence[xr.Dataset]) -> dict[str, str]:
+    """Tells of imperfect copies which noises are drawn, and which are not."""
+    drawn, others = monte_carlo.noises_in_words(made)
+    return {"drawn": drawn, "left": _PROSE["left"].format(others=others) if others else ""}
 
 
 def loading_path_animation(study: StudyResults) -> Animation:

@@ -17,6 +17,7 @@ from reports.figures.loading_path import (
     abscissa_of,
     by_structure,
     design_panels,
+    marks,
     measure_panel,
     measures,
     path_axes,
@@ -63,7 +64,7 @@ def wave_figure(study: StudyResults) -> PanelFigure:
             _PROSE["d"],
             [Table("waves.csv", "every structure over time (panels d to f)", _over_time(study))],
         ),
-        Panel(("e", "Mimicking error", 0.0, low), error, _PROSE["e"]),
+        Panel(("e", "Mimicking error", 0.0, low), error, _PROSE["e"].format(marks=marks([study]))),
         Panel(
             ("f", contacts.contact_measure(study.problem).title, half, low),
             lambda figure: _edges(

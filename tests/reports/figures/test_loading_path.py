@@ -1,6 +1,7 @@
 import dataclasses
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
@@ -13,21 +14,23 @@ from pipeline.posing import law_comparison
 from pipeline.problem import Output
 from pipeline.problem.sections import Method, Methods, Paper
 from reports.facts import checks, fact_records, loss_formula
-from reports.facts.copies import spreads
+from reports.facts.copies import in_words, spreads
 from reports.figures import kinds
 from reports.figures.loading_path import (
     abscissa,
     curves,
     figure,
     measures,
+    monte_carlo,
     tables,
 )
 from reports.figures.loading_path import facts as path_facts
 from reports.figures.robust_table import robust_table
 from reports.figures.shielding import facts as shielding
 from reports.figures.study_report import as_built_facts, study_report
+from reports.figures.wave.figure import wave_figure
 from reports.page import publish
-from reports.panels import payload
+from reports.panels import PanelFigure, payload
 from reports.study import StudyResults
 from tests.reports import figure_assertions, recorded_study
 from tests.reports.loading_paths import made, values
@@ -99,7 +102,25 @@ def test_recordings_are_placed_and_have_the_only_bands(smile: StudyResults, tmp_
         axes = Figure().add_subplot()
         curves.measure_panel(axes, study, path, measure)
         counts.append(len(axes.collections))
-    assert counts == [len(curves.DRAWN) + 1, 2]  # two sizes of geometry; one band a recording
+    assert counts == [len(monte_carlo.DRAWN) + 1, 2]  # two sizes of geometry; one band a recording
+
+
+@pytest.mark.parametrize("compose", [figure.loading_path_figure, wave_figure])
+def test_captions_name_the_imperfections_that_are_drawn(
+    smile: StudyResults, compose: Callable[[StudyResults], PanelFigure]
+) -> None:
+    """Say of the others that they stand in tables, where bands are and where rows are."""
+    assert smile.scatter is not None
+    named = ["geometry 5 %", "together 0.1 mm, 5 %", "common 10 %"]
+    some = smile.scatter.isel(noise=range(len(named))).assign_coords(noise=named)
+    told = compose(changed(smile, "scatter", some)).caption
+    drawn = f"{in_words(named[0])}, {in_words(named[1])}"
+    left = f"{in_words(named[2])} stand in the tables alone"
+    assert f"hold 90 % of the imperfect cloaks, each of one kind: {drawn}; {left}" in told
+    few = compose(changed(smile, "scatter", some.isel(noise=[0]))).caption
+    assert "stand in the tables" not in few
+    if compose is not wave_figure:
+        assert f"over imperfect cloaks, {drawn}: median" in told
 
 
 def test_bands_are_of_the_structures_that_are_drawn(smile: StudyResults, tmp_path: Path) -> None:
