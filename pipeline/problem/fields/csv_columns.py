@@ -6,27 +6,19 @@ import csv
 import math
 import re
 from collections.abc import Mapping, Sequence
-from itertools import pairwise, takewhile
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from pipeline.problem.fields import units
+from pipeline.problem.fields import column_units, units
 from pipeline.runtime import UserError, read_bounded, refusal
 
 if TYPE_CHECKING:
     from sim.core import Floats
 
 _LARGEST = 512 << 20
-_UNIT = re.compile(r"[\[(][^\])]+[\])]")
-_NUMBERS = re.compile(r"[\s\";]*[-+.]?\d")
 _GAP = re.compile(r"(?:[-+]?nan(?:\(.*\))?|#?n/?a|-+|null|none|[-+]?1[.,]#\w+)?", re.IGNORECASE)
 """Cells of what was not measured, as programs write them."""
-_HEADING = re.compile(
-    r"(?P<name>.*?)\s*(?:(?P<bracket>[\[(])|(?<=\s)/\s+)(?P<unit>[^\])]+)(?(bracket)[\])])"
-)
-_ENDING = re.compile(r".+[\s_,/](?P<unit>[A-Za-zµ°]+)")
-_FOREIGN = re.compile("ns|ms|us|hrs?|hours?|lbs?|lbf|kip|ozf?|dyn|gf|kgf?|m?V|mm|cm|um|px")
-"""Units at the end of a name that are told from a word, whatever is wanted there."""
 
 
 class CsvCells(NamedTuple):
@@ -71,7 +63,7 @@ def read_preamble(path: Path) -> list[str]:
     Raises:
         UserError: no such file, or too large.
     """
-    return [*takewhile(lambda line: not _NUMBERS.match(line), _lines(path))]
+    return [*takewhile(lambda line: not column_units.NUMBERS.match(line), _lines(path))]
 
 
 def _lines(path: Path) -> list[str]:
@@ -85,7 +77,7 @@ def _lines(path: Path) -> list[str]:
 
 def _separator(lines: list[str]) -> str:
     """Finds the sign that parts most of the lines of numbers; those above may hold any in words."""
-    numbers = [line for line in lines if _NUMBERS.match(line)] or lines
+    numbers = [line for line in lines if column_units.NUMBERS.match(line)] or lines
     parted = (sign for sign in ";\t" if 2 * sum(sign in line for line in numbers) > len(numbers))
     return next(parted, ",")
 
@@ -97,8 +89,8 @@ def read_columns(
 
     Lines above the heading are comments, as are those below it that begin with a word or `#`.
     Where the dimensions of columns are given, and the heading (as `NAME (UNIT)`, `NAME / UNIT` or
-    `NAME_UNIT`) or the line below it has units, numbers are converted to working units; else they
-    are in these.
+    `NAME_UNIT`) or a line of words below it has units, numbers are converted to working units; else
+    they are in these.
 
     Raises:
         UserError: no such file, no such column, a unit of another dimension, no numbers in them, or
@@ -107,16 +99,17 @@ def read_columns(
     import numpy as np
 
     cells = read_cells(path)
-    if dimensions:
-        cells = cells._replace(rows=_with_units_below(cells.rows))
     heading, named = _heading(cells.rows, names, path)
     factors: Floats = np.ones(len(names))
+    kinds = {named[name]: kind for name, kind in zip(names, dimensions, strict=False)}
+    line, below = column_units.find_units_below(cells.rows, heading, kinds)
     for place, (name, dimension) in enumerate(zip(names, dimensions, strict=False)):
-        column = [
-            row[named[name]] for row in cells.rows[heading - 1 :][:2] if len(row) > named[name]
-        ]
-        if (unit := _told_unit(column, dimension)) is not None:
-            factors[place] = _factor(unit, dimension, name, path)
+        title, at = cells.rows[heading - 1][named[name]], heading
+        unit = column_units.unit_of_title(title) or column_units.unit_at_end(title, dimension)
+        if unit is None:
+            unit, at = below.get(named[name]), line
+        if unit is not None:
+            factors[place] = column_units.factor(unit, dimension, name, path, at)
     columns = [(name, named[name]) for name in names]
     found: list[list[float | None]] = []
     for line, row in enumerate(cells.rows[heading:], heading + 1):
@@ -137,7 +130,7 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
     """Reads the named columns (lines, names) in working units, of at least so many lines.
 
     The heading names every column as `NAME (UNIT)` or `NAME / UNIT`, or the units stand in the
-    line below the names, with or without brackets; lines above it are comments.
+    first line of units below the names, with or without brackets; lines above are comments.
 
     Raises:
         UserError: no such file or column, no unit or a wrong one, too few lines, or a line without
@@ -146,15 +139,19 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
     import numpy as np
 
     cells = read_cells(path)
-    cells = cells._replace(rows=_with_units_below(cells.rows))
     heading, named = _heading(cells.rows, list(wanted), path)
-    if bare := _bare_units(cells.rows[heading:], named, wanted):
-        cells.rows[heading] = []
+    kinds = {named[name]: kind for name, kind in wanted.items()}
+    line, below = column_units.find_units_below(cells.rows, heading, kinds)
     titles = {name: cells.rows[heading - 1][named[name]] for name in wanted}
-    told = {name: _unit(title) or bare.get(name) for name, title in titles.items()}
-    factors = [_factor(told[name], wanted[name], name, path) for name in wanted]
+    told = {name: column_units.unit_of_title(title) for name, title in titles.items()}
+    factors = [
+        column_units.factor(told[name], kind, name, path, heading)
+        if told[name] is not None
+        else column_units.factor(below.get(named[name]), kind, name, path, line or heading)
+        for name, kind in wanted.items()
+    ]
     lines = [(number, row) for number, row in enumerate(cells.rows, 1) if any(row)]
-    lines = [(number, row) for number, row in lines if number > heading]
+    lines = [(number, row) for number, row in lines if number > max(heading, line)]
     if len(lines) < least:
         remedy = f"give {least} lines or more below the heading"
         raise UserError(f"only {len(lines)} lines of numbers", file=path, remedy=remedy)
@@ -176,7 +173,7 @@ def _unread(
     None is found in comments and in lines that begin with a word.
     """
     texts = [(name, at, cells.text(row, at)) for name, at in columns]
-    if not any(_NUMBERS.match(text) for *_, text in texts) or row[0].startswith("#"):
+    if not any(column_units.NUMBERS.match(text) for *_, text in texts) or row[0].startswith("#"):
         return None
     if texts[0][2][:1].isalpha():  # of a line at the end, such as `Maximum;1020,7`
         return None
@@ -193,82 +190,42 @@ def _not_finite(path: Path, line: int, name: str, value: str, remedy: str) -> Us
     return UserError(what, file=path, line=line, key=name, value=value, remedy=remedy)
 
 
-def _with_units_below(rows: list[list[str]]) -> list[list[str]]:
-    """Joins names and the units that some testing machines write in the line below them."""
-    found = list(rows)
-    for line, (names, below) in enumerate(pairwise(rows)):
-        told = [_UNIT.fullmatch(cell) for cell in below if cell]
-        if told and all(told) and len(names) >= len(below):
-            blanks = [""] * (len(names) - len(below))
-            found[line] = [
-                f"{name} {unit}".strip() for name, unit in zip(names, below + blanks, strict=True)
-            ]
-            found[line + 1] = []
-    return found
-
-
-def _bare_units(
-    below: list[list[str]], named: Mapping[str, int], wanted: Mapping[str, units.Dimension]
-) -> dict[str, str]:
-    """Reads units without brackets in the first of these lines; none where one is no unit."""
-    first = below[0] if below else []
-    found = {name: first[named[name]] for name in wanted if named[name] < len(first)}
-    found = {name: unit for name, unit in found.items() if unit}
-    return found if all(_is_unit(unit, wanted[name]) for name, unit in found.items()) else {}
-
-
 def _heading(
     rows: list[list[str]], wanted: Sequence[str], path: Path
 ) -> tuple[int, dict[str, int]]:
     """Finds the line of the heading, counted from one, and the column of each name in it."""
-    seen: list[str] = []
     for line, row in enumerate(rows, 1):
-        matches = [_HEADING.fullmatch(cell) for cell in row]
-        bare = {match["name"]: column for column, match in enumerate(matches) if match}
-        named = bare | {cell: column for column, cell in enumerate(row)}
-        if set(wanted) <= set(named):
-            return line, named
-        if len(row) >= len(wanted) and not seen:
-            seen = row
-    remedy = f"name the columns as the file does; it has: {', '.join(seen) or 'none'}"
+        matches = [column_units.HEADING.fullmatch(cell) for cell in row]
+        bare = [match["name"] if match else None for match in matches]
+        if all(name in row or name in bare for name in wanted):
+            return line, {name: _only(name, row, bare, path, line) for name in wanted}
+    remedy = f"name the columns as the file does; it has: {', '.join(_names(rows)) or 'none'}"
     raise UserError("columns are missing", file=path, value=list(wanted), remedy=remedy)
 
 
-def _unit(title: str) -> str | None:
-    """Reads the unit that stands in brackets, or behind a stroke, in a column's title."""
-    match = _HEADING.fullmatch(title)
-    return match and match["unit"]
+def _only(
+    name: str, titles: Sequence[str], bare: Sequence[str | None], path: Path, line: int
+) -> int:
+    """Finds the one column of a name: that of a whole title, or of one without its unit."""
+    known = titles if name in titles else bare
+    found = [column for column, each in enumerate(known) if each == name]
+    if len(found) > 1:
+        places = " and ".join(f"{column + 1} ({titles[column]})" for column in found)
+        raise UserError(
+            f"the name is that of the columns {places}",
+            file=path,
+            line=line,
+            key=name,
+            remedy="rename the wanted one, or delete the others: one column is read of each name",
+        )
+    return found[0]
 
 
-def _told_unit(column: list[str], dimension: units.Dimension) -> str | None:
-    """Reads the unit in a column's title, or in the cell below it.
-
-    A word behind the name, or below it, is one if it fits there or can be nothing else.
-    """
-    title, *below = column
-    if (unit := _unit(title)) is not None:
-        return unit
-    match = _ENDING.fullmatch(title)
-    words = [match["unit"], *below] if match else below
-    return next((word for word in words if _is_unit(word, dimension)), None)
-
-
-def _is_unit(word: str, dimension: units.Dimension) -> bool:
-    try:
-        units.parse_quantity(f"1 {word}", dimension)
-    except UserError:
-        return _FOREIGN.fullmatch(word) is not None
-    return True
-
-
-def _factor(unit: str | None, dimension: units.Dimension, name: str, path: Path) -> float:
-    """Computes how many working units a column's unit is."""
-    heading = f"write the heading as {name} ({dimension.unit})"
-    if unit is None:
-        remedy = f"{heading}, with the unit of the numbers"
-        raise UserError("the unit of the column is missing", file=path, key=name, remedy=remedy)
-    try:
-        return units.parse_quantity(f"1 {unit}", dimension)
-    except UserError as error:
-        remedy = f"convert the numbers to {dimension.unit}, and {heading}"
-        raise UserError(error.what, file=path, key=name, value=unit, remedy=remedy) from error
+def _names(rows: list[list[str]]) -> list[str]:
+    """Finds the last line of words above the numbers that is none of units."""
+    filled = [[cell for cell in row if cell] for row in rows]
+    shares = [[column_units.NUMBERS.match(cell) is not None for cell in row] for row in filled]
+    first = next((k for k, row in enumerate(shares) if row and 2 * sum(row) >= len(row)), len(rows))
+    words = [row for row, share in zip(filled[:first], shares, strict=False) if not any(share)]
+    named = [row for row in words if row and not column_units.is_line_of_units(row)]
+    return named[-1] if named else []

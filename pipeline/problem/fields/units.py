@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pint import UnitRegistry
 
 _DEFINITIONS = """
-micro- = 1e-6 = µ- = u-
+micro- = 1e-6 = µ- = μ- = u-
 milli- = 1e-3 = m-
 centi- = 1e-2 = c-
 kilo- = 1e3 = k-
@@ -31,7 +31,7 @@ radian = [angle] = rad
 degree = 0.017453292519943295 * radian = deg = °
 tonne = 1e6 * gram = t
 minute = 60 * second = min
-inch = 0.0254 * meter = in
+inch = 0.0254 * meter = in = inches
 hertz = 1 / second = Hz
 newton = 1000 * gram * meter / second ** 2 = N
 gram_force = 9.80665e-3 * newton = gf
@@ -45,7 +45,7 @@ _GREATEST = 1e12
 """In working units."""
 _NUMBER = r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
 # Only products of integer powers go to pint, whose own grammar would evaluate any arithmetic.
-_POWER = r"[A-Za-zµ°]+(?:(?:\^|\*\*)-?\d)?"
+_POWER = r"[A-Za-zµμ°]+(?:(?:\^|\*\*)-?\d)?"
 _UNIT = rf"(?P<unit>{_POWER}(?:\s*[*·/ ]\s*{_POWER})*)"
 _QUANTITY = re.compile(rf"\s*{_NUMBER}\s*(?:{_UNIT}|(?P<rest>\S.*?))?\s*")
 

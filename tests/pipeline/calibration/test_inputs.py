@@ -53,9 +53,10 @@ def test_units_may_stand_in_the_line_below_the_names(heading: str, tmp_path: Pat
     assert len(found) == 7
 
 
-@pytest.mark.parametrize(
-    ("unit", "newtons"), [("lbf", 4.4482216), ("kgf", 9.80665), ("gf", 9.80665e-3)]
-)
+WEIGHTS = {"lbf": 4.4482216, "LBF": 4.4482216, "kgf": 9.80665, "Kgf": 9.80665, "gf": 9.80665e-3}
+
+
+@pytest.mark.parametrize(("unit", "newtons"), [*WEIGHTS.items(), ("KN", 1000.0)])
 @pytest.mark.parametrize("form", ["displacement (mm),force ({})", "displacement,force\nmm,{}"])
 def test_forces_are_read_in_weights(form: str, unit: str, newtons: float, tmp_path: Path) -> None:
     path = tmp_path / "readings.csv"
@@ -63,11 +64,48 @@ def test_forces_are_read_in_weights(form: str, unit: str, newtons: float, tmp_pa
     np.testing.assert_allclose(csv_columns.read_quantities(path, WANTED)[0], [1.0, 2 * newtons])
 
 
-@pytest.mark.parametrize("heading", ["displacement (mm),force (ozf)", "displacement,force\nmm,ozf"])
-def test_numbers_in_an_unknown_unit_are_to_be_converted(heading: str, tmp_path: Path) -> None:
-    error = refusal(f"{heading}\n{ROWS}\n", tmp_path)
-    assert error.what == "unknown unit 'ozf'"
+UNKNOWN = ["ozf", "daN", "kips", "tonf", "pounds", "pulses"]
+
+
+@pytest.mark.parametrize("unit", UNKNOWN)
+@pytest.mark.parametrize("heading", ["displacement (mm),force ({})", "displacement,force\nmm,{}"])
+def test_numbers_in_an_unknown_unit_are_to_be_converted(
+    heading: str, unit: str, tmp_path: Path
+) -> None:
+    error = refusal(f"{heading.format(unit)}\n{ROWS}\n", tmp_path)
+    assert error.what == f"unknown unit '{unit}'"
     assert error.remedy == "convert the numbers to N, and write the heading as force (N)"
+
+
+@pytest.mark.parametrize("between", ["", "CH1,CH2", "# in mm, N"])
+@pytest.mark.parametrize("told", ["um,kN", "\u00b5m,kN", "\u03bcm,KN", "(um),(kN)"])
+def test_the_line_of_units_may_follow_others(between: str, told: str, tmp_path: Path) -> None:
+    path = tmp_path / "readings.csv"
+    path.write_text(f"displacement,force\n{between}\n{told}\n{ROWS}\n", encoding="utf-8")
+    for found in (
+        csv_columns.read_quantities(path, WANTED, least=7),
+        csv_columns.read_columns(path, list(WANTED), list(WANTED.values())),
+    ):
+        np.testing.assert_allclose(found[0], [1e-3, 2000.0])
+
+
+def test_a_name_that_occurs_twice_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "readings.csv"
+    path.write_text("# two\nway,force (kN),force (N)\nmm,,\n0,1,2\n", encoding="utf-8")
+    wanted = {"way": units.LENGTH, "force": units.FORCE}
+    with refused("columns 2 (force (kN)) and 3 (force (N))", "force", file=path) as caught:
+        csv_columns.read_quantities(path, wanted)
+    assert caught.value.line == 2
+    whole = {"way": units.LENGTH, "force (kN)": units.FORCE}
+    np.testing.assert_array_equal(csv_columns.read_quantities(path, whole), [[0.0, 1000.0]])
+
+
+@pytest.mark.parametrize("told", ["(s),(mm),(N)", "s,mm,N"])
+def test_the_names_of_a_file_are_told_not_its_preamble(told: str, tmp_path: Path) -> None:
+    text = f'"Label","S1"\n"Rate",5.00,"mm/min"\n\nTime,Extension,Load\n{told}\n0,0,1\nMax,1,2\n'
+    remedy = refusal(text, tmp_path).remedy or ""
+    assert "it has: Time" in remedy
+    assert "Load" in remedy
 
 
 @pytest.mark.parametrize("comment", ["# Zwick; compression\tof s1", "Operator; Meier\ttoday"])
