@@ -10,7 +10,7 @@ from pipeline.comparison.alignment import LEAST_FRAMES, too_few_frames
 from pipeline.comparison.registration import Registration, measure_places, register
 from pipeline.posing import CLAMPED, DRIVEN
 from pipeline.runtime import UserError
-from pipeline.tracking.geometry import outlines_of_design
+from pipeline.tracking.geometry import difference_of_vertices, outlines_of_design
 from pipeline.tracking.output import distinct_frames, drive_displacement, driven_units
 from sim.core import Floats, Ints, Mask
 
@@ -19,7 +19,6 @@ LEAST_PER_PERIOD = 8
 COMPARED, HELD, PUSHED, ABSENT, LOST = range(5)
 
 _SEEN = 0.5  # of the frames, or a unit counts as lost
-_SAME = 0.5  # mm between a vertex of the track and of the design
 
 
 class Measurement(NamedTuple):
@@ -97,11 +96,8 @@ def check_track(track: xr.Dataset, design: xr.Dataset, leading: Ints | None = No
     """
     if not np.array_equal(track["unit"].values, design["unit"].values):
         raise _another(f"it has {track.sizes['unit']} units, the design {design.sizes['unit']}")
-    tracked, built = (data["vertices"].values for data in (track, design))
-    if tracked.shape != built.shape or not np.array_equal(np.isnan(tracked), np.isnan(built)):
-        raise _another("other units are absent, or they have other vertices")
-    if (apart := float(np.nanmax(np.abs(tracked - built)))) > _SAME:
-        raise _another(f"vertices are up to {apart:.2f} mm from where the design has them")
+    if told := difference_of_vertices(track["vertices"].values, design["vertices"].values):
+        raise _another(told)
     seen = np.isfinite(track["displacement"].values[:, driven_units(design, leading), 0]).any(
         axis=1
     )

@@ -24,6 +24,7 @@ from pipeline.calibration.inputs import (
 from pipeline.problem.fields import csv_columns, units
 from pipeline.problem.sections import Lattice as Specimen
 from pipeline.runtime import UserError
+from pipeline.tracking.geometry import difference_of_vertices
 from pipeline.tracking.output import distinct_frames, grip_displacement
 from sim.core import Floats, Ints, Numbers
 from sim.energy import topology
@@ -110,6 +111,18 @@ def _read_track(path: Path, specimen: Specimen, test: TestKind) -> tuple[Floats,
         what = f"the track is of {track.sizes['unit']} units, the lattice of {specimen.n_units}"
         remedy = "describe in lattice the specimen that was filmed"
         raise UserError(what, file=path, key="unit", remedy=remedy)
+    tracked, lattice = track["vertices"].values, specimen.network()
+    built = lattice.padded(lattice.vertices)
+    if tracked.shape == built.shape:  # the origin may be elsewhere
+        built = built + np.nanmedian(tracked - built, axis=(0, 1))
+    if told := difference_of_vertices(tracked, built):
+        raise UserError(
+            f"the track is of another specimen than the lattice: {told}",
+            file=path,
+            key="vertices",
+            remedy="describe in lattice the specimen that was filmed: columns, rows, spacing and"
+            " bias_angle, which counts the opposite way of a description's bias_angle_deg",
+        )
     if not np.isfinite(track["load_force"]).any():
         remedy = "give load_cell in the recording's YAML, and track it again"
         raise UserError("the track has no forces", file=path, key="load_force", remedy=remedy)

@@ -14,4 +14,5 @@ from .rigid_fit import rotation_matrix as rotation_matrix
 from .specimen_outlines import SpecimenOutlines as SpecimenOutlines
 from .specimen_outlines import as_built as as_built
 from .specimen_outlines import clamped_units as clamped_units
+from .specimen_outlines import difference_of_vertices as difference_of_vertices
 from .specimen_outlines import outlines_of_design as outlines_of_design

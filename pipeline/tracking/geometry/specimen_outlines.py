@@ -9,6 +9,8 @@ import xarray as xr
 from pipeline.datasets.tables import TABLES
 from sim.core import Floats, Ints, Mask
 
+_SAME = 0.5  # mm between a vertex of a track and the same one of a design
+
 
 @dataclass(frozen=True)
 class SpecimenOutlines:
@@ -65,6 +67,17 @@ def as_built(design: xr.Dataset, structure: str) -> xr.Dataset:
         void = TABLES["design"]["region"].flags["void"]
         vertices = vertices.where(design["region"] != void)
     return design.assign(vertices=vertices)
+
+
+def difference_of_vertices(tracked: Floats, built: Floats) -> str | None:
+    """Tells how the vertices (units, vertices, 2) of a track differ from others, NaN where absent.
+
+    None where all lie within half a millimetre.
+    """
+    if tracked.shape != built.shape or not np.array_equal(np.isnan(tracked), np.isnan(built)):
+        return "other units are absent, or they have other vertices"
+    apart = float(np.nanmax(np.abs(tracked - built)))
+    return f"vertices are up to {apart:.2f} mm apart" if apart > _SAME else None
 
 
 def outlines_of_design(design: xr.Dataset) -> SpecimenOutlines:

@@ -15,6 +15,7 @@ from pipeline.calibration.inputs import ForceDisplacement, LoadCycles, RecordOpt
 from pipeline.calibration.load_cycle_study import follow_cycle, measure_cycle
 from pipeline.problem.fields import SIM_UNITS, csv_columns
 from pipeline.problem.reading import load_section, overlay_keys
+from pipeline.problem.sections import Lattice as Specimen
 from pipeline.problem.sections import ListedNetwork
 from pipeline.runtime import ROOT, UserError
 from sim.energy import observe
@@ -215,17 +216,21 @@ def test_the_displacement_of_a_track_is_not_turned(turned: str) -> None:
     asked_of("run.csv", record={"reversed": turned})
 
 
-def track_of(way: np.ndarray, top: slice, bottom: slice) -> xr.Dataset:
+def track_of(
+    way: np.ndarray, top: slice, bottom: slice, specimen: Specimen | None = None
+) -> xr.Dataset:
     """A track of a squeezed specimen whose fixture gives way, and whose top grip is askew."""
     motion = np.zeros((len(way), 12, 3))
     motion[:, :, 1] = 0.1 * way[:, None]
     motion[:, top, 1] -= way[:, None] * [0.9, 1.0, 1.1]
     motion[3, top.stop - 1] = np.nan
     motion[4, bottom.start] = np.nan
+    lattice = (specimen or asked_of("run.nc").lattice).network()
     coordinates = {"dof": ["ux", "uy", "theta"], "j": ("unit", np.repeat(range(4), 3))}
     variables = {
         "displacement": (("time", "unit", "dof"), motion),
         "load_force": ("time", 3 * way),
+        "vertices": (("unit", "vertex", "xy"), lattice.padded(lattice.vertices + 3.0)),
         "timing": ("time", np.zeros(len(way), np.int8)),
     }
     return xr.Dataset(variables, coordinates)
@@ -242,6 +247,11 @@ def test_a_track_with_a_load_cell_is_a_test(monkeypatch: pytest.MonkeyPatch) -> 
     assert len(read(asked_of("run.nc"), FOLDER)[0]) == len(way) - 1
     with refused("of 12 units, the lattice of 9", "unit"):
         read(asked_of("run.nc", lattice=LATTICE | {"rows": 3}), FOLDER)
+    for key, value in {"spacing": "12 mm", "bias_angle": "20 deg"}.items():
+        with refused("of another specimen", "vertices", "opposite way", file=FOLDER / "run.nc"):
+            read(asked_of("run.nc", lattice=LATTICE | {key: value}), FOLDER)
+    with refused("of another specimen", "vertices"):
+        read(asked_of("run.nc", lattice=LATTICE | {"columns": 4, "rows": 3}), FOLDER)
     track["load_force"][:] = np.nan
     with pytest.raises(UserError, match="no forces"):
         read(asked_of("run.nc"), FOLDER)
@@ -262,7 +272,9 @@ def test_rows_of_a_listed_lattice_go_by_their_places(monkeypatch: pytest.MonkeyP
         context=SIM_UNITS,
     )
     way = np.linspace(0, 2, 9)
-    track = track_of(way, slice(0, 3), slice(9, 12)).assign_coords(j=("unit", np.zeros(12, int)))
+    track = track_of(way, slice(0, 3), slice(9, 12), listed).assign_coords(
+        j=("unit", np.zeros(12, int))
+    )
     monkeypatch.setattr(datasets, "read", lambda *_: track)
     found = force_displacement.read(asked_of("run.nc"), listed, FOLDER)
     np.testing.assert_allclose(found, [way, 3 * way], atol=1e-6)
