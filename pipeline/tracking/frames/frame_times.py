@@ -12,7 +12,7 @@ from sim.core import Floats
 _ROUNDED = 0.5
 """Part of an interval by which steady frames may differ: some containers count milliseconds."""
 
-_BARE = {"h264", "hevc", "m4v", "mjpeg"}
+BARE = {"h264", "hevc", "m4v", "mjpeg"}
 """Kinds of files without stamps, to which FFmpeg may give those of 25 Hz."""
 
 _BEGINNING = 8
@@ -32,7 +32,7 @@ class FrameClock:
 
     def __init__(self, path: Path, stream: av.VideoStream, rate: float | None) -> None:
         self._path, self._usual, self._rate = path, float(stream.average_rate or 1), rate
-        self._bare = stream.container.format.name in _BARE
+        self._bare = stream.container.format.name in BARE
         self._first: float | None = None
         self._instants: set[float] = set()
         self.lasted = 0.0  # by the stamps

@@ -11,10 +11,11 @@ from pipeline.problem.fields import fault
 from pipeline.problem.reading import explain_error, yaml_file
 from pipeline.runtime import UserError
 from pipeline.tracking.frames.picture_folder import has_pictures
-from pipeline.tracking.frames.video import VIDEOS, rendered
+from pipeline.tracking.frames.video import VIDEOS, own_rate, rendered
 from sim.core import Floats, Ints
 
 _WANTED = {"name", "grid", "spacing_mm", "ligament_gap_mm", "bias_angle_deg"}
+_SAME_RATE = 0.03  # relative difference up to which a file's own times are kept
 
 
 class _Described(BaseModel):
@@ -90,8 +91,14 @@ def recording_text(described: dict[str, Any], video: Path, design: str) -> str:
     ]
     if scale := described.get("approx_px_per_mm"):
         lines.append(f"pixel_size: {1 / scale:.4g} mm")
-    if video.is_dir() and (rate := described.get("fps")):
-        lines.append(f"frame_rate: {rate:g} Hz")
+    if rate := described.get("fps"):
+        own = own_rate(video)
+        if own is None:
+            lines.append(f"frame_rate: {rate:g} Hz")
+        elif abs(rate / own - 1) > _SAME_RATE:
+            lines.append(
+                f"frame_rate: {rate:g} Hz # as described; the file itself has {own:.4g} Hz"
+            )
     return "\n".join(lines) + "\n"
 
 

@@ -12,7 +12,13 @@ from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.runtime import UserError
 from pipeline.tracking.frames.decoded_picture import Orientation, Shades, orientation
 from pipeline.tracking.frames.frame import Frame, broken_off
-from pipeline.tracking.frames.frame_times import FrameClock, goes_on, promised_count, stream_length
+from pipeline.tracking.frames.frame_times import (
+    BARE,
+    FrameClock,
+    goes_on,
+    promised_count,
+    stream_length,
+)
 from pipeline.tracking.frames.picture_folder import pictures, read_folder
 
 _KINDS = {
@@ -92,6 +98,18 @@ def frame_count(path: Path) -> int:
             return max(1, round(promised_count(container, stream, float(stream.average_rate or 0))))
     except (av.FFmpegError, FileNotFoundError, IndexError):
         return 1
+
+
+def own_rate(path: Path) -> float | None:
+    """Reads the frames per second that a video tells; None where it tells none."""
+    if path.is_dir():
+        return None
+    try:
+        with open_video(path) as container:
+            rate = container.streams.video[0].average_rate
+            return None if container.format.name in BARE or not rate else float(rate)
+    except (av.FFmpegError, FileNotFoundError, IndexError):
+        return None
 
 
 def video_length(path: Path, rate: float | None = None) -> float:

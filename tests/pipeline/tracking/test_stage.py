@@ -52,6 +52,22 @@ def test_a_recording_that_was_edited_is_not_written_over(recording: Path, failin
     assert "frame_rate: 300 Hz" in recording.read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize(("fps", "line"), [(2400, "frame_rate: 2400 Hz #"), (301, None)])
+def test_slow_motion_keeps_the_rate_of_its_description(fps: float, line: str | None) -> None:
+    """A file of 300 frames per second keeps its own times unless it was filmed at another rate."""
+    described = import_video.description(CLIPS / "f_silhouette.yaml") | {"fps": fps}
+    text = import_video.recording_text(described, Path(VIDEO), "design.nc")
+    found = [each for each in text.splitlines() if each.startswith("frame_rate")]
+    assert [each[: len(line or "")] for each in found] == ([line] if line else [])
+    assert yaml.safe_load(text).get("frame_rate") == (f"{fps} Hz" if line else None)
+
+
+def test_a_bare_stream_takes_the_rate_of_its_description(tmp_path: Path) -> None:
+    described = import_video.description(CLIPS / "f_silhouette.yaml")
+    text = import_video.recording_text(described, tmp_path / "none.h264", "design.nc")
+    assert "frame_rate: 300 Hz\n" in text
+
+
 def refused(recording: Path, failing: Failing) -> str:
     return failing("track", [str(recording), "--out", str(recording.with_name("track.nc"))])
 
