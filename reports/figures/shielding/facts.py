@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.comparison import compute_reduction
+from pipeline.problem import Problem
 from reports.facts import (
     MEASURED,
     Fact,
@@ -54,7 +55,7 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
     return [
         *grouped("Scene", scene_facts(study)),
         *grouped("Shielding", loss_facts(study)),
-        *grouped("Optimisation", history_facts(design)),
+        *grouped("Optimisation", history_facts(study.problem, design)),
         *grouped("Shape", shape_facts(study)),
         *grouped("Motion of the middle unit of the top edge", motion_facts(scene, response)),
         *grouped("Measured motion of the same unit", recorded_facts(study)),
@@ -134,15 +135,14 @@ def paper_loss(start: float) -> float:
     return start * (1.0 - PAPER_REDUCTION) ** 2
 
 
-def history_facts(design: xr.Dataset) -> Iterator[Fact]:
+def history_facts(problem: Problem, design: xr.Dataset) -> Iterator[Fact]:
     """Yields evaluations and best feasible loss of every method."""
     for method in design["method"].values:
         history, of = design.sel({"method": method}), {"method": method, "name": method.upper()}
-        loss, at = history["loss"].values, int(history["best_evaluation"])
         count, best = evaluation_count(history), float(history["best_loss"])
-        soon = measures.first_within(loss, best, 0.9)
-        yield _told("evaluations_{method}", count, at=at, soon=soon, **of)
-        note = "shipped" if method == design.attrs.get("shipped_method") else "not shipped"
+        reached = checks.reached(problem, history)
+        yield _told("evaluations_{method}", count, reached=reached, **of)
+        note = checks.shipping(problem, design, str(method))
         yield _loss("best_{method}", best, design["best_loss"], note=note, **of)
         yield _told("kkt_{method}", float(history["kkt_residual"]), **of)
 

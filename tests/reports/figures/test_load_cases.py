@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from pipeline import problem
 from pipeline.problem import Output
 from pipeline.problem.fields import SIM_UNITS
-from pipeline.problem.sections import SeveralDrives
+from pipeline.problem.sections import LoadRanges, SeveralDrives
 from pipeline.problem.sections.drives import RotationDrive
 from reports.base import style
-from reports.facts import Fact
+from reports.facts import Fact, checks
 from reports.facts.measures import first_within
 from reports.figures.loading_path import (
     abscissa,
@@ -25,6 +25,7 @@ from reports.figures.loading_path import (
     snapshot_grid,
     tables,
 )
+from reports.figures.shielding import facts as shielding
 from reports.study import StudyResults, evaluation_count
 from tests.reports import recorded_study
 from tests.reports.compressed_study import SHIELD, written
@@ -155,6 +156,19 @@ def test_failed_evaluations_count(two: StudyResults) -> None:
     history["violation"] = ("evaluation", [0.0] * 6 + [np.nan])
     assert evaluation_count(history) == 6
     assert first_within(history["loss"].values, 0.1, 0.9) == 5
+
+
+@pytest.mark.parametrize("ranges", [None, LoadRanges()])
+def test_losses_under_loads_in_ranges_are_not_called_the_worst(
+    two: StudyResults, study: StudyResults, ranges: LoadRanges | None
+) -> None:
+    for results, told in ((two, checks.history_facts), (study, shielding.history_facts)):
+        objective = results.problem.objective.model_copy(update={"loads": ranges})
+        asked = results.problem.model_copy(update={"objective": objective})
+        found = {fact.key: fact.note for fact in told(asked, results.design)}
+        assert ("of the way" in found["evaluations_sqp"]) == (ranges is None)
+        assert found["evaluations_sqp"].startswith("best feasible after")
+        assert ("not the worst of all" in found["best_sqp"]) == (ranges is not None)
 
 
 def test_recordings_are_compared_under_their_own_load_case(
