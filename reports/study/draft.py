@@ -12,7 +12,8 @@ from reports.base import ALTERED
 def reasons(problem: Problem, study: Problem) -> list[str]:
     """Lists where `problem`, a preset of `study`, is less than that; empty at full size.
 
-    Only what both have is compared: a force is no less than a displacement.
+    Only what both have is compared: a force is no less than a displacement, and a preset that has
+    another method of optimisation alone, or no sweep, is whole without.
     """
     full = _sizes(study)
     reduced = [
@@ -27,14 +28,20 @@ def reasons(problem: Problem, study: Problem) -> list[str]:
 
 def _sizes(problem: Problem) -> dict[str, float]:
     sweep, robustness = problem.sweep, problem.robustness
-    sqp = problem.optimiser.methods.sqp
     return {
         "units": problem.lattice.n_units,
         **_load_sizes(problem),
-        "evaluations of the design": sqp.evaluations if sqp else 0,
-        "cases in the sweep": case_count(sweep) if sweep else 0,
-        "imperfect copies": robustness.samples if robustness else 0,
+        **_budgets(problem),
+        **({} if sweep is None else {"cases in the sweep": case_count(sweep)}),
+        **({} if robustness is None else {"imperfect copies": robustness.samples}),
     }
+
+
+def _budgets(problem: Problem) -> dict[str, float]:
+    """Lists the evaluations of every method; a design that starts from another needs fewer."""
+    optimiser = problem.optimiser
+    chosen = optimiser.methods.chosen if optimiser.start == "initial" else {}
+    return {f"evaluations by {name.upper()}": each.evaluations for name, each in chosen.items()}
 
 
 def _load_sizes(problem: Problem) -> dict[str, float]:

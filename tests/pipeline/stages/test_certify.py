@@ -116,7 +116,7 @@ def test_the_page_shows_the_worst_load(
     assert facts["reduction"].value == pytest.approx(100 * reduction)
     assert "DRAFT" not in text
     static.as_draft(path, 30)
-    assert "3 evaluations of the design instead of 30" in page_of(
+    assert "3 evaluations by SQP instead of 30" in page_of(
         path, files, tmp_path / "quick", "--preset", "quick"
     )
     own = {"study": f"{tmp_path.name}@quick"}  # which makes it a design in its own right

@@ -5,6 +5,8 @@ import yaml
 
 from pipeline import problem
 from pipeline.problem import Problem
+from pipeline.problem.sections import Method, Methods
+from pipeline.runtime import ROOT
 from reports.study import draft
 from tests.pipeline import static
 
@@ -53,3 +55,31 @@ def test_a_force_is_no_less_than_a_displacement(tmp_path: Path) -> None:
     shift = driven(tmp_path, amplitude="15 mm", **ramp)
     assert draft.reasons(push, shift) == []
     assert draft.reasons(shift, push) == []
+
+
+@pytest.mark.parametrize(
+    ("methods", "start", "reason"),
+    [
+        ({"sqp": 4, "mma": 3}, "initial", ["3 evaluations by MMA instead of 9"]),
+        ({"mma": 9}, "initial", []),
+        ({"sqp": 3}, "initial", ["3 evaluations by SQP instead of 4"]),
+        ({"sqp": 3}, "study", []),
+    ],
+)
+def test_evaluations_are_compared_by_method_and_from_the_same_start(
+    tmp_path: Path, methods: dict[str, int], start: str, reason: list[str]
+) -> None:
+    study = torque(tmp_path, 100.0)
+    budgets = Methods(sqp=Method(evaluations=4), mma=Method(evaluations=9))
+    mine = Methods(**{name: Method(evaluations=count) for name, count in methods.items()})
+    asked = study.with_optimiser(methods=mine, start=start)
+    assert draft.reasons(asked, study.with_optimiser(methods=budgets)) == reason
+
+
+def test_what_a_preset_leaves_out_is_not_less() -> None:
+    study = problem.load(ROOT / "experiments/fig2/problem.yaml")
+    less = study.model_copy(update={"sweep": None, "robustness": None})
+    assert study.sweep is not None
+    assert draft.reasons(less, study) == []
+    (few, *_) = draft.reasons(problem.load(ROOT / "experiments/fig2/problem.yaml", "quick"), study)
+    assert "instead of" in few
