@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,13 +11,28 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.problem.outlines.painted_areas import Painted, painted_outlines, wound_outlines
+from pipeline.problem.outlines.drawing_paints import (
+    CLIPS,
+    check_clips,
+    check_paints,
+    check_pictures,
+    grey,
+    is_filled,
+    is_seen,
+    is_wound,
+)
+from pipeline.problem.outlines.painted_areas import (
+    Painted,
+    painted_outlines,
+    pieces_of,
+    wound_outlines,
+)
 from pipeline.problem.outlines.plane import Outline, extents
 from pipeline.runtime import UserError, read_bounded
 
 if TYPE_CHECKING:
+    from svgelements import SVG
     from svgelements import Path as SvgPath
-    from svgelements import Shape
 
 DARK, LIGHT = 77, 178
 """Grey levels (of 255) below which a pixel is dark, and above which it is light."""
@@ -140,73 +154,40 @@ def _of_drawing(path: Path, threshold: float | None, invert: bool) -> list[NDArr
         drawing = ElementTree.parse(path).getroot()
         _check_copies(drawing)
         _set_aside(drawing)
-        shapes, paths = _parsed(drawing)
-        _check_outlines(shapes, paths)
+        read, paths = _parsed(drawing)
+        elements = list(read.elements())
+        _check_outlines(elements, paths)
+        check_pictures(elements)
+        check_paints(paths)
         count = min(SEGMENTS, MOST_POINTS // max(1, sum(map(len, paths))))
         if count < 2:
             raise ValueError(f"it has more than {MOST_POINTS // 2} pieces; simplify it")
-        drawn = [[points for points in _pieces(each, count) if len(points) > 2] for each in paths]
+        drawn = [pieces_of(each, count) for each in paths]
         if any(not (np.abs(points) < FARTHEST).all() for pieces in drawn for points in pieces):
             raise ValueError(f"it has points further than {FARTHEST:g} from its origin")
+        check_clips(read)
         filled = [
-            wound_outlines(pieces) if _is_wound(each) else pieces
+            wound_outlines(pieces) if is_wound(each) else pieces
             for each, pieces in zip(paths, drawn, strict=True)
         ]
     # an XML parse error is a SyntaxError; a radius or a scale of 1e-300 divides by zero
     except (OSError, ValueError, SyntaxError, ArithmeticError, RecursionError) as error:
         raise UserError(f"not a readable SVG: {error}", remedy="save it as plain SVG") from error
     level = LIGHT if threshold is None else 255 * threshold
-    shown = [(_grey(each) < level) != invert for each in paths]
-    return painted_outlines([*map(Painted, shown, map(_is_filled, paths), filled)])
+    shown = [(grey(each) < level) != invert for each in paths]
+    return painted_outlines([*map(Painted, shown, map(is_filled, paths), filled)])
 
 
-def _is_seen(shape: Shape) -> bool:
-    """Tells a shape that has a fill or a stroke, and is not wholly transparent."""
-    told = shape.values
-    if told.get("visibility") in ("hidden", "collapse") or _is_zero(told.get("opacity")):
-        return False
-    return _is_filled(shape) or (shape.stroke_width != 0.0 and _paints(shape, "stroke"))
-
-
-def _is_filled(shape: Shape) -> bool:
-    return _paints(shape, "fill")
-
-
-def _is_wound(shape: Shape) -> bool:
-    """Tells a fill of all that its outline winds round, whichever way and how often."""
-    return _is_filled(shape) and str(shape.values.get("fill-rule")).strip() != "evenodd"
-
-
-def _paints(shape: Shape, kind: str) -> bool:
-    colour = getattr(shape, kind)
-    if colour is None or colour.value is None or colour.alpha == 0:
-        return False
-    return not _is_zero(shape.values.get(f"{kind}-opacity"))
-
-
-def _is_zero(share: str | None) -> bool:
-    return re.fullmatch(r"\s*[+-]?(0+\.?0*|\.0+)%?\s*", share or "") is not None
-
-
-def _grey(path: SvgPath) -> float:
-    """Returns the grey level, of 255, of a path's fill, or else of its stroke, black without."""
-    for kind in ("fill", "stroke"):
-        if _paints(path, kind):
-            paint = getattr(path, kind)
-            return (paint.red + paint.green + paint.blue) / 3
-    return 0.0
-
-
-def _parsed(drawing: ElementTree.Element) -> tuple[list[Any], list[SvgPath]]:
-    """Returns the elements of a drawing, and those that are seen and have an outline as paths."""
+def _parsed(drawing: ElementTree.Element) -> tuple[SVG, list[SvgPath]]:
+    """Returns a drawing, and its elements that are seen and have an outline as paths."""
     from svgelements import SVG, Shape
     from svgelements import Path as Curve
 
     try:
         held = BytesIO(ElementTree.tostring(drawing))
-        elements = list(SVG.parse(held, reify=True).elements())
-        shapes = (each for each in elements if isinstance(each, Shape))
-        return elements, [Curve(each) for each in shapes if _is_seen(each)]
+        read = SVG.parse(held, reify=True)
+        shapes = (each for each in read.elements() if isinstance(each, Shape))
+        return read, [Curve(each) for each in shapes if is_seen(each)]
     except Exception as error:  # whatever a parser of another project meets in a damaged file
         raise ValueError(f"{type(error).__name__}: {error}") from error
 
@@ -220,7 +201,7 @@ def _check_outlines(elements: list[Any], paths: list[SvgPath]) -> None:
         raise UserError("the drawing holds text, which has no outline", remedy=remedy)
     for path in paths:
         pieces = [piece for piece in path.as_subpaths() if len(piece) > 1]
-        if not _is_filled(path) and any(
+        if not is_filled(path) and any(
             not isinstance(piece[-1], Close) and piece[0].end != piece[-1].end for piece in pieces
         ):
             remedy = "close them, or convert strokes to paths (Inkscape: Path > Stroke to Path)"
@@ -258,36 +239,21 @@ def _check_copies(drawing: ElementTree.Element) -> None:
 
 
 def _set_aside(drawing: ElementTree.Element) -> None:
-    """Moves to definitions what is not painted where it stands."""
+    """Moves to definitions what is not painted where it stands, all clips to the last of them."""
+    space = drawing.tag.rpartition("}")[0]
+    defs = f"{space}}}defs" if space else "defs"
+    clips = ElementTree.Element(defs, id=CLIPS)
     for above in list(drawing.iter()):
-        for place, element in enumerate(above):
-            space, brace, name = element.tag.rpartition("}")
-            if name in UNPAINTED:
-                above[place] = ElementTree.Element(f"{space}{brace}defs")
+        for place, element in enumerate(list(above)):
+            name = element.tag.rpartition("}")[2]
+            if name == "clipPath":
+                clips.append(element)
+                above[place] = ElementTree.Element(defs)
+            elif name in UNPAINTED:
+                above[place] = ElementTree.Element(defs)
                 above[place].append(element)
+    drawing.append(clips)
 
 
 def _is_copy(element: ElementTree.Element) -> bool:
     return element.tag.rpartition("}")[2] == "use"
-
-
-def _pieces(path: SvgPath, chords: int) -> Iterator[NDArray[Any]]:
-    """Yields the outline of each piece of a path, from one move to the next."""
-    from svgelements import Close, Line, Move
-
-    places: list[tuple[float, float]] = []
-    for segment in path:
-        if isinstance(segment, Move):
-            yield _without_repeats(places)
-            places = []
-        elif segment.end is not None:
-            count = 1 if isinstance(segment, Line | Close) else chords
-            points = (segment.point(k / count) for k in range(1, count + 1))
-            places += [(float(point.x), float(point.y)) for point in points]
-    yield _without_repeats(places)
-
-
-def _without_repeats(places: list[tuple[float, float]]) -> NDArray[Any]:
-    before = places[-1:] + places[:-1]
-    kept = [here for here, last in zip(places, before, strict=True) if here != last]
-    return np.array(kept).reshape(-1, 2)

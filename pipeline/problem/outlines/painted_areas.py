@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import groupby
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
+    from svgelements import Path as SvgPath
 
 MOST_CROSSINGS = 2000
 """Of the edges of one fill."""
@@ -28,6 +29,33 @@ class Painted(NamedTuple):
     in_shape: bool
     filled: bool
     pieces: list[NDArray[Any]]
+
+
+def pieces_of(path: SvgPath, chords: int) -> list[NDArray[Any]]:
+    """Lists the outlines of a path's pieces that have an area, with that many chords a curve."""
+    return [points for points in _pieces(path, chords) if len(points) > 2]
+
+
+def _pieces(path: SvgPath, chords: int) -> Iterator[NDArray[Any]]:
+    """Yields the outline of each piece of a path, from one move to the next."""
+    from svgelements import Close, Line, Move
+
+    places: list[tuple[float, float]] = []
+    for segment in path:
+        if isinstance(segment, Move):
+            yield _without_repeats(places)
+            places = []
+        elif segment.end is not None:
+            count = 1 if isinstance(segment, Line | Close) else chords
+            points = (segment.point(k / count) for k in range(1, count + 1))
+            places += [(float(point.x), float(point.y)) for point in points]
+    yield _without_repeats(places)
+
+
+def _without_repeats(places: list[tuple[float, float]]) -> NDArray[Any]:
+    before = places[-1:] + places[:-1]
+    kept = [here for here, last in zip(places, before, strict=True) if here != last]
+    return np.array(kept).reshape(-1, 2)
 
 
 def painted_outlines(paths: list[Painted]) -> list[NDArray[Any]]:
@@ -56,14 +84,16 @@ def _apart(paths: list[Painted]) -> bool:
 
 def _areas(paths: list[Painted]) -> list[Geometry]:
     """Lists the areas of fills, and the one that an odd number of lines without a fill encloses."""
-    import shapely
-
     fills = [each.pieces for each in paths if each.filled]
     lines = [points for each in paths if not each.filled for points in each.pieces]
-    return [
-        shapely.make_valid(shapely.MultiPolygon([shapely.Polygon(points) for points in pieces]))
-        for pieces in (*fills, lines)
-    ]
+    return [filled_area(pieces) for pieces in (*fills, lines)]
+
+
+def filled_area(pieces: list[NDArray[Any]]) -> Geometry:
+    """Finds the area within an odd number of outlines."""
+    import shapely
+
+    return shapely.make_valid(shapely.MultiPolygon([shapely.Polygon(each) for each in pieces]))
 
 
 def wound_outlines(pieces: list[NDArray[Any]]) -> list[NDArray[Any]]:

@@ -145,6 +145,31 @@ def test_a_fill_that_crosses_itself_without_end_is_refused(tmp_path: Path) -> No
         read_outlines(path)
 
 
+DEFINED = (
+    '<defs><clipPath id="a"><rect x="1" y="1" width="9.5" height="9.5"/></clipPath>'
+    '<clipPath id="b" clip-path="url(#a)"><rect width="20" height="20"/></clipPath>'
+    '<linearGradient id="g"><stop stop-color="#fff"/></linearGradient></defs>'
+)
+
+
+@cases("problem", "drawn, what")
+def test_what_outlines_do_not_tell_is_refused(drawn: str, what: str, tmp_path: Path) -> None:
+    path = tmp_path / "l.svg"
+    head = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 20 20" width="40" height="40">'
+    path.write_text(f"{head}{drawn}{DEFINED}</svg>")
+    with refused(what, remedy="Inkscape"):
+        read_outlines(path)
+
+
+@cases("problem", "drawn")
+def test_what_changes_no_outline_is_read(drawn: str, tmp_path: Path) -> None:
+    """Draws a square that a clip leaves whole, or beside which what is hidden needs no outline."""
+    path = tmp_path / "l.svg"
+    head = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 20 20" width="40" height="40">'
+    path.write_text(f"{head}{drawn}{DEFINED}</svg>")
+    assert extents(read_outlines(path)[0]) == pytest.approx((18.0, 18.0))
+
+
 @cases("problem", "hidden")
 def test_what_is_not_seen_is_no_shape(hidden: str, tmp_path: Path) -> None:
     """As the frame of an icon: it is seen neither before nor after what is."""
