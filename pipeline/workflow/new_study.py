@@ -44,15 +44,27 @@ def work(args: argparse.Namespace) -> None:
         made = aside / "problem.yaml"
         made.write_text(text(args), encoding="utf-8")
         try:
-            for preset in (None, "quick"):
-                problem.load(made, preset)
+            problem.load(made)
         except UserError as error:  # the template is sound: it is the image
             error.file, error.line = str(args.image), None
             raise
-    own, draft = WORK / "experiments", f"{BUILD} {args.name}@quick"
+        has_draft = _has_draft(made)
+    own = WORK / "experiments"
+    what, build = ("a draft", f"{args.name}@quick") if has_draft else ("build it", args.name)
+    build = f"{BUILD} {build}"
     if args.folder.resolve() != own.resolve():
-        draft = f"move its folder to {own}, then {draft}"
-    LOG.info("made %s; a draft: %s", folder / "problem.yaml", draft)
+        build = f"move its folder to {own}, then {build}"
+    LOG.info("made %s; %s: %s", folder / "problem.yaml", what, build)
+
+
+def _has_draft(made: Path) -> bool:
+    """Tells a study whose void fits the small lattice of its draft too, and warns of another."""
+    try:
+        problem.load(made, "quick")
+    except UserError as error:
+        LOG.warning("no draft before presets.quick.void is changed: %s", error.what)
+        return False
+    return True
 
 
 def text(args: argparse.Namespace) -> str:

@@ -63,6 +63,22 @@ def test_a_coloured_logo_becomes_a_void(tmp_path: Path, capsys: pytest.CaptureFi
     assert len(one) == 52
 
 
+def test_a_shape_that_no_draft_can_hold_makes_a_study(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Draws two discs, between which all of the units of the small lattice lie."""
+    logo = Image.new("L", (300, 100), 255)
+    for left in (0, 240):
+        ImageDraw.Draw(logo).ellipse((left, 20, left + 59, 79), fill=0)
+    logo.save(tmp_path / "logo.png")
+    words = ["--image", str(tmp_path / "logo.png"), "--folder", str(tmp_path)]
+    with caplog.at_level("INFO"):
+        assert run_stage("new", ["two", *words]) == 0
+    assert void_units(load(tmp_path / "two/problem.yaml"))
+    assert "presets.quick.void is changed: no unit lies in the void" in caplog.text
+    assert caplog.text.rstrip().endswith("make two")
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
