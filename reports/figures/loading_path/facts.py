@@ -5,6 +5,7 @@ A publication's words for them stand in the problem, under `report.paper.values`
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -173,10 +174,12 @@ def _each(
     **words: object,
 ) -> Iterator[Fact]:
     """Yields a fact of each structure, of values (structure,): the words `key`_{structure}."""
+    mean = ["weighted mean of the load cases"] if study.response.sizes["case"] > 1 else []
     for name in names:
         shown = display_name(study.problem, name).lower()
         value = float(values.sel(structure=name))
-        yield _told(f"{key}_{{structure}}", value, structure=name, shown=shown, **words)
+        fact = _told(f"{key}_{{structure}}", value, structure=name, shown=shown, **words)
+        yield replace(fact, note="; ".join([*filter(None, [fact.note]), *mean]))
 
 
 def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:

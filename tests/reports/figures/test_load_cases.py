@@ -68,6 +68,12 @@ def test_each_load_case_has_rows_snapshots_and_a_curve(two: StudyResults) -> Non
     assert turns[1] == pytest.approx(3 * turns[0])
     assert found["rotation_altered"].value == pytest.approx(2 * turns[0])
     assert "shear 90°" in found["rotation_altered_case1"].label
+    assert found["rotation_altered"].note.endswith("; weighted mean of the load cases")
+    assert found["rotation_altered_case1"].note == "one load case"
+    several = [*facts.reaction_facts(two, path), *facts.contraction_facts(two, path)]
+    told = [fact.note for fact in several if "_case" not in fact.key]
+    assert told
+    assert all(note.endswith("weighted mean of the load cases") for note in told)
     columns = tables.path(two)
     names = ("altered_rotation_deg_compression_180deg", "altered_rotation_deg_shear_90deg")
     first, second = (np.asarray(columns[name]) for name in names)
