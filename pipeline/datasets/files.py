@@ -132,10 +132,10 @@ def _check_origin(dataset: xr.Dataset, path: Path, kind: Kind, remedy: str) -> N
         what = "a netCDF file, but none of this workflow's (it has no `kind` and `schema_version`)"
         raise UserError(what, file=path, remedy=f"give a {kind} dataset")
     if str(found) != kind:
-        what = f"a {kind} dataset is wanted"
-        raise UserError(
-            what, file=path, key="kind", value=str(found), remedy=f"give a {kind} dataset"
-        )
+        what, remedy = f"a {kind} dataset is wanted", f"give a {kind} dataset"
+        if (str(found), kind) == ("design_method", "design"):
+            remedy = "`python -m pipeline select` makes one of the designs of all methods"
+        raise UserError(what, file=path, key="kind", value=str(found), remedy=remedy)
     if version not in (*MIGRATED, SCHEMA_VERSION):
         newer = version > SCHEMA_VERSION
         raise UserError(

@@ -164,6 +164,12 @@ def test_a_dataset_of_another_kind_or_version_is_refused(sweep: Path) -> None:
     with refused("a design dataset is wanted") as caught:
         read(sweep, "design")
     assert caught.value.value == "sweep"
+    with netCDF4.Dataset(sweep, "a") as raw:
+        raw.kind = "design_method"
+    with refused("a design dataset is wanted", remedy="python -m pipeline select"):
+        read(sweep, "design")
+    with netCDF4.Dataset(sweep, "a") as raw:
+        raw.kind = "sweep"
     for version, remedy in ((SCHEMA_VERSION + 1, "update this software"), (0, "delete it and run")):
         with netCDF4.Dataset(sweep, "a") as raw:
             raw.schema_version = version
