@@ -1,7 +1,7 @@
 """Holds the parts of a specimen as data: units with their slots, shims, other flat parts.
 
-All lengths in mm. Units lie in the specimen frame (origin at the lattice point of unit (0, 0), x to
-the right, y up, seen from the top); z = 0 is the underside.
+All lengths in mm. Units lie in the specimen frame (with the lattice's origin, x to the right, y
+up, seen from the top); z = 0 is the underside.
 """
 
 from __future__ import annotations

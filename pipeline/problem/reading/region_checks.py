@@ -26,8 +26,7 @@ def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
     key = "radius" if shape == "disc" else "outer"
     if room < 0:
         what = f"the centre of the {' '.join(map(str, keys))} lies outside the lattice"
-        extent = f"{max(across):g} by {max(up):g} mm"
-        yield ProblemFault(what, (*keys, shape, "centre"), f"the outermost sites span {extent}")
+        yield ProblemFault(what, (*keys, shape, "centre"), _sites_range(problem))
     elif outer > room:
         what = f"{keys[0]} of radius {outer:g} mm reaches beyond the lattice"
         remedy = f"keep it within {room:g} mm of its centre ({x:g}, {y:g}) mm"
@@ -49,11 +48,21 @@ def regions(problem: Problem) -> Findings:
         yield from (*_cloak(problem), *_interest(problem))
 
 
+def _elsewhere(problem: Problem) -> str:
+    return f"enlarge it, or move its centre: {_sites_range(problem)}"
+
+
+def _sites_range(problem: Problem) -> str:
+    _, across, up = zip(*problem.lattice.sites(), strict=True)
+    x, y = (f"from {min(each):.4g} to {max(each):.4g} mm" for each in (across, up))
+    return f"the sites lie at x {x} and y {y}"
+
+
 def _cloak(problem: Problem) -> Findings:
     yield from _region_fits(problem, problem.cloak, ("cloak",))
     if not cloak_units(problem):
         what = "no unit lies in the cloak (driven units and the region of interest are left out)"
-        yield ProblemFault(what, ("cloak",), "enlarge it, or move its centre")
+        yield ProblemFault(what, ("cloak",), _elsewhere(problem))
 
 
 def _interest(problem: Problem) -> Findings:
@@ -70,7 +79,7 @@ def _interest(problem: Problem) -> Findings:
     if problem.objective.region == "surroundings":
         yield ProblemFault(what, ("cloak",), "leave units outside it")
     else:
-        yield ProblemFault(what, ("objective", "region"), "enlarge it, or move its centre")
+        yield ProblemFault(what, ("objective", "region"), _elsewhere(problem))
 
 
 def _is_decided(problem: Problem, looked_at: set[int]) -> bool:
@@ -86,7 +95,7 @@ def void(problem: Problem) -> Findings:
         return
     removed = void_units(problem)
     if not removed:
-        yield ProblemFault("no unit lies in the void", ("void",), "enlarge it, or move its centre")
+        yield ProblemFault("no unit lies in the void", ("void",), _elsewhere(problem))
     yield from _void_and_supports(problem, set(removed))
     yield from _void_and_rest(problem, set(removed))
 
@@ -98,7 +107,7 @@ def inclusion(problem: Problem) -> Findings:
     stiff = set(inclusion_units(problem))
     if not stiff:
         what = "no unit lies in the inclusion"
-        yield ProblemFault(what, ("inclusion", "region"), "enlarge it, or move its centre")
+        yield ProblemFault(what, ("inclusion", "region"), _elsewhere(problem))
     if both := sorted(stiff & set(void_units(problem))):
         what = f"unit {problem.lattice.name(both[0])} is in the void and in the inclusion"
         yield ProblemFault(what, ("inclusion", "region"), "keep the two apart")
