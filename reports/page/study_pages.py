@@ -124,9 +124,9 @@ def study_page(
         "player_note": " ".join(filter(None, [rounding(player), text.note])),
         "provenance": [each for label, study in studies.items() for each in sources(study, label)],
         "problem": _json(asked or problems),
-        "skipped": list(dict.fromkeys(line for study in several for line in _skipped(study))),
+        "skipped": _told_of(studies, _skipped),
         "draft": draft,
-        "warnings": list(dict.fromkeys(line for study in several for line in _warnings(study))),
+        "warnings": _told_of(studies, _warnings),
         "recordings": recordings,
         "synthetic": synthetic,
         "claims": judged,
@@ -155,6 +155,20 @@ def rounding(player: Mapping[str, Any]) -> str:
         f"{shown} of {saved} saved {frames}, rounded to ±{worded(shift, 'mm', 1)} and "
         f"±{worded(turn, 'rad', 1)}; between them the motion is interpolated."
     )
+
+
+def _told_of(
+    studies: Mapping[str, StudyResults], tell: Callable[[StudyResults], list[str]]
+) -> list[str]:
+    """Lists what is told of studies, each once, with the names of those that it holds for."""
+    names: dict[str, list[str]] = {}
+    for name, study in studies.items():
+        for line in dict.fromkeys(tell(study)):
+            names.setdefault(line, []).append(name)
+    return [
+        line if len(found) == len(studies) else f"{', '.join(found)}: {line}"
+        for line, found in names.items()
+    ]
 
 
 def _skipped(study: StudyResults) -> list[str]:

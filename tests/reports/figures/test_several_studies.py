@@ -61,6 +61,25 @@ def test_the_page_tells_each_study_and_shows_each_structure_once(report: Path) -
     ]  # fmt: skip
 
 
+def test_warnings_bear_the_study_that_they_are_of(pair: list[StudyResults]) -> None:
+    """Names none where they are of all."""
+    warned = [
+        _planned(pair[0], skipped=["the sweep"], warnings=["both", "a soft unit"]),
+        _planned(pair[1], skipped=[], warnings=["both"]),
+    ]
+    told = several_studies_report("fig", ASKED, warned).values
+    assert told["warnings"][:2] == ["both", "fig_smile: a soft unit"]
+    assert told["skipped"] == ["fig_smile: the sweep"]
+    alone = several_studies_report("fig", ASKED, warned[:1]).values
+    assert alone["warnings"][:2] == ["both", "a soft unit"]
+
+
+def _planned(study: StudyResults, **told: list[str]) -> StudyResults:
+    plans = dict.fromkeys(json.loads(study.response.attrs["plan"]), told)
+    response = study.response.assign_attrs(plan=json.dumps(plans))
+    return dataclasses.replace(study, datasets={**study.datasets, "response": response})
+
+
 @pytest.mark.slow
 def test_command_line(tmp_path: Path) -> None:
     experiments = tmp_path / "experiments"
