@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from pipeline.problem.fields import Section, exactly_one, fault
 from pipeline.problem.reading import load_section
 from pipeline.runtime import UserError
-from reports.facts.fact_records import ABSENT, Fact
+from reports.facts.fact_records import ABSENT, Fact, worded
 
 Relation = Literal["is", "about", "at least", "at most", "above", "below"]
 Status = Literal["holds", "does not hold", "not yet evaluated", "not claimed"]
@@ -60,7 +60,7 @@ class Claim(Section):
     def tolerance(self) -> str:
         """Tells what may be said to agree with it, in words."""
         if self.relation == "is":
-            return "as quoted"
+            return "as quoted: less than half of its last digit off"
         return f"within {ABOUT:.0%}" if self.relation == "about" else self.relation
 
 
@@ -163,8 +163,10 @@ def _side(claim: Claim, fact: Fact | None, spacing: Fact | None, missing: str) -
     if fact is None or not math.isfinite(fact.value):
         return Side(ABSENT, "not yet evaluated", missing)
     value, unit, place = parsed(claim.number)
+    ours = fact.ours
     if unit == "spacings" and spacing is not None:
         value, unit, place = value * spacing.value, spacing.unit, place * spacing.value
+        ours += f" = {worded(fact.value / spacing.value, 'spacings', 3)}"
     if unit != fact.unit:
         raise UserError(
             f"the fact is in {fact.unit}, the claim in {unit}",
@@ -173,17 +175,20 @@ def _side(claim: Claim, fact: Fact | None, spacing: Fact | None, missing: str) -
             remedy="give the claim in the unit of the fact",
         )
     holds = agrees(fact.value, claim.relation, value, place)
-    return Side(fact.ours, "holds" if holds else "does not hold")
+    return Side(ours, "holds" if holds else "does not hold")
 
 
 def agrees(ours: float, relation: Relation, paper: float, place: float) -> bool:
-    """Tells whether our number stands in the relation to the paper's, quoted to `place`."""
-    half = place / 2 * (1 + 1e-9)
+    """Tells whether our number stands in the relation to the paper's, quoted to `place`.
+
+    It is rounded to that: a number half of `place` off is another.
+    """
+    half = place / 2 * (1 - 1e-9)
     return {
-        "is": abs(ours - paper) <= half,
+        "is": abs(ours - paper) < half,
         "about": abs(ours - paper) <= ABOUT * abs(paper),
-        "at least": ours >= paper - half,
-        "at most": ours <= paper + half,
+        "at least": ours > paper - half,
+        "at most": ours < paper + half,
         "above": ours > paper,
         "below": ours < paper,
     }[relation]

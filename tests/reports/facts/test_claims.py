@@ -92,8 +92,10 @@ def test_multiples_of_the_spacing_are_lengths_other_units_refused() -> None:
     radius = number("interest_radius", "radius", 52.0, "mm")
     spacing = number("spacing", "spacing", 15.0, "mm")
     assert found(radius, spacing)["interest_radius"].simulation.status == "holds"
-    off = replace(radius, value=67.5)
-    assert found(off, spacing)["interest_radius"].simulation.status == "does not hold"
+    assert found(radius, spacing)["interest_radius"].simulation.ours == "52 mm = 3.47 spacings"
+    for value in (37.5, 52.5, 67.5):
+        off = replace(radius, value=value)
+        assert found(off, spacing)["interest_radius"].simulation.status == "does not hold"
     with pytest.raises(UserError, match="rotation_altered"):
         found(replace(ROTATION, unit="rad"))
 
