@@ -192,7 +192,8 @@ def _unlikeness(
 ) -> float:
     """Multiplies residuals of outlines by rotations: outlines of others are turned to fit.
 
-    Units without a blob of their own do not count: those at the rim differ from place to place.
+    Rotations below the standard error of one unit's are noise, and count as that. Units without a
+    blob of their own do not count: those at the rim differ from place to place.
     """
     camera = lens.facing(specimen.centre[detection.unit], detection.blob)
     fitter = PoseFitter(camera, templates)
@@ -202,7 +203,8 @@ def _unlikeness(
     if found.mean() < _FOUND:
         return np.inf
     turned = fits.pose[found, 2]
-    return _misfit(fits) * float(np.mean(np.abs(turned - np.median(turned))))
+    turn = float(np.mean(np.abs(turned - np.median(turned))))
+    return _misfit(fits) * max(turn, float(np.sqrt(np.median(fits.scatter[found, 2, 2]))))
 
 
 def _gain(image: Picture) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
+from benchmarks.tracking.rendering import Renderer, View, eight_bit
 from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.tracking.detect import detect_lattice, orientation_text, specimen_orientation
@@ -129,6 +130,20 @@ def test_a_part_of_a_lattice_is_seen_as_the_recording_says(mirrored: bool) -> No
     specimen = outlines_of_design(import_video.design(GRID))
     ways = recognise(image, specimen, SCALE, RecordingSetup(mirrored=mirrored))
     assert {specimen_orientation(way.camera)[1] for way in ways} == {mirrored}
+
+
+@pytest.mark.parametrize(("aside", "tilt"), [(15.0, 0.0), (10.0, 0.02)])
+def test_squares_cut_by_the_rim_are_seen_all_ways(aside: float, tilt: float) -> None:
+    """Their outlines fit all alike: which by a hair is noise; upright is taken, if none is told."""
+    squares = outlines_of_design(import_video.design(GRID | {"grid": [7, 6]}))
+    view = View(size=(272, 318), scale=3.03, tilt=tilt)
+    moved = np.tile([aside, 0.0, 0.0], (1, squares.count, 1))
+    image = eight_bit(Renderer(squares, lambda _: moved, view).frame(0.0))
+    ways = recognise(image, squares, 3.03, RecordingSetup())
+    assert len(ways) == 8
+    assert orientation_text(ways[0].camera) == "upright"
+    told = recognise(image, squares, 3.03, RecordingSetup(turned=0.0, mirrored=False))
+    assert [orientation_text(way.camera) for way in told] == ["upright"]
 
 
 def test_a_long_specimen_is_found_upright_in_an_upright_picture() -> None:
