@@ -78,6 +78,7 @@ def test_a_pushed_structure_that_floats_is_followed_as_by_explicit_steps() -> No
         sim.simulate(floating.updated(integrator=name), vertices=floating.lattice.vertices)
         for name in ("implicit", "explicit")
     )
+    assert one.plan.warnings == ()
     np.testing.assert_allclose(one.losses, other.losses, rtol=RULES["draft"].loss)
 
 
