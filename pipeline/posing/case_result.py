@@ -261,12 +261,7 @@ def _at_rest(scene: Scene, vertices: Floats, angles: Floats) -> PosedStructure:
 def times_of(asked: Problem, scene: Scene) -> Times:
     """Merges the output times of a problem's response."""
     horizon = scene.loads.duration
-    end = (
-        horizon
-        if asked.frequency is None
-        else max(horizon, asked.response.cycles / asked.frequency)
-    )
-    shown = np.linspace(0.0, end, asked.response.samples)
+    shown = np.linspace(0.0, asked.response_time, asked.response.samples)
     integrated = sample_times(scene)
     sampled = (
         integrated if scene.objective.steps else np.linspace(0.0, horizon, asked.horizon.samples)
@@ -275,4 +270,7 @@ def times_of(asked: Problem, scene: Scene) -> Times:
     nanoseconds = [np.round(times * 1e9).astype(np.int64) for times in wanted]
     every, place = np.unique(np.concatenate(nanoseconds), return_inverse=True)
     ends = np.cumsum([len(times) for times in wanted])[:-1]
-    return Times(np.asarray(every * 1e-9), *np.split(place, ends))
+    merged = np.asarray(every * 1e-9)
+    if asked.measured:  # nothing is known beyond the end, by which the last may be rounded up
+        merged = np.minimum(merged, asked.response_time)
+    return Times(merged, *np.split(place, ends))

@@ -204,10 +204,11 @@ def _idle(asked: Problem) -> Iterator[str]:
     """Doubts keys of other values than by default, which nothing in the problem takes up."""
     moving, avoiding = not asked.static, asked.objective.snap == "avoid"
     twice = "sqp" in asked.optimiser.methods.chosen and asked.contact.law == "geometric"
+    cycling = asked.frequency is not None and not asked.measured
     keys = (
         (asked.solver, "solver.accuracy", moving, "motions in time"),
         (asked.solver, "solver.integrator", moving, "motions in time"),
-        (asked.response, "response.cycles", asked.frequency is not None, "drives with a frequency"),
+        (asked.response, "response.cycles", cycling, "drives with a frequency"),
         (asked.report, "report.instants", moving, "motions in time"),
         (asked.report, "report.snapshots", not moving, "static paths"),
         (asked.objective, "objective.snap_margin", avoiding, "`objective.snap: avoid`"),
@@ -237,9 +238,8 @@ def _cut_off(asked: Problem) -> Iterator[str]:
 
 def _shown(asked: Problem) -> Iterator[str]:
     """Doubts what a report is to show and the response does not reach."""
-    first, horizon = single_drives(asked.drive)[0], asked.horizon_time
-    cycles = asked.response.cycles / asked.frequency if asked.frequency else 0.0
-    name, end, unit = "instants", max(horizon, cycles), "s"
+    first = single_drives(asked.drive)[0]
+    name, end, unit = "instants", asked.response_time, "s"
     if asked.static:
         name, end, unit = "snapshots", getattr(first, "amplitude", math.inf), first.unit
     listed: tuple[float, ...] = getattr(asked.report, name)

@@ -39,6 +39,7 @@ from pipeline.problem.sections import (
     Sweep,
     TanhRampDrive,
     TestSetup,
+    TimeSeriesDrive,
     Tolerances,
     VoidRegion,
     read_several,
@@ -124,7 +125,7 @@ class ResponseOptions(Section):
     """Part of the response that the report shows.
 
     Attributes:
-        cycles: periods of the drive.
+        cycles: periods of the drive, in steady motion; a measured one is shown over the horizon.
         samples: instants or load steps, both ends included.
     """
 
@@ -265,6 +266,21 @@ class Problem(Section):
         assert self.horizon.periods is not None
         assert self.frequency is not None
         return self.horizon.periods / self.frequency
+
+    @property
+    def measured(self) -> bool:
+        """Tells a drive that follows a file, if only one of several."""
+        return any(isinstance(drive, TimeSeriesDrive) for drive in single_drives(self.drive))
+
+    @property
+    def response_time(self) -> float:
+        """Computes the time that is shown, in s: as many cycles as are asked for.
+
+        It is the horizon at least, and no more where a file need not go on.
+        """
+        if self.frequency is None or self.measured:
+            return self.horizon_time
+        return max(self.horizon_time, self.response.cycles / self.frequency)
 
     @property
     def tolerances(self) -> Tolerances:
