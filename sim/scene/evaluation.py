@@ -91,10 +91,16 @@ class GradientChain:
             memory.keep(design, records.records)
         (value, more), (bar_motion, direct) = self._measured(motion, made, *passed)
         still = np.zeros_like(velocity)
-        through = adjoint_cases(solver, records, np.asarray(bar_motion), still).parameters
+        through = adjoint_cases(solver, records, _slopes(bar_motion), still).parameters
         # added by NumPy: JAX would compile a sum for each shape
-        bar = Parameters(*(np.asarray(a) + b for a, b in zip(direct, through, strict=True)))
+        bar = Parameters(*(_slopes(a) + b for a, b in zip(direct, through, strict=True)))
         return float(value), self.of_design.pull_back(design, bar), np.asarray(more)
+
+
+def _slopes(computed: Array) -> Floats:
+    """Takes no slope for zero: a root has none where what it measures vanishes."""
+    slopes = np.asarray(computed)
+    return np.where(np.isnan(slopes), 0.0, slopes)
 
 
 def _started(solver: Solver, memory: Memory | None) -> list[Solver] | None:

@@ -10,6 +10,7 @@ from sim.scene import (
     Scene,
     SceneError,
     StrainEnergyMimicking,
+    evaluate,
     make_plan,
     mimicking,
     simulate,
@@ -113,6 +114,15 @@ def test_the_force_is_that_of_the_units_of_each_drive() -> None:
             np.testing.assert_allclose(force[case], wanted, rtol=1e-9, atol=1e-9)
             assert abs(wanted[-1, 0]) > 0.1
         np.testing.assert_allclose(response.losses, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("reaction", [0.0, 0.5])
+def test_a_motion_that_is_met_exactly_has_no_slope(reaction: float) -> None:
+    """The root of the squares has one to each side."""
+    made = pressed(1.0, reaction=reaction)
+    loss, gradient = evaluate(made.updated(reference=made))
+    assert loss == 0.0
+    np.testing.assert_array_equal(gradient, 0.0)
 
 
 def test_losses_are_in_the_order_of_the_load_cases() -> None:
