@@ -66,14 +66,21 @@ def _below(results: Path, fault: UserError) -> str:
 def tables(built: Sequence[BuiltReport]) -> list[dict[str, Any]]:
     """Returns the claims by figure, of those that are built and of those that are not (None)."""
     by_name = {each.name: each for each in built}
-    made = []
+    made: list[dict[str, Any]] = []
     for name in dict.fromkeys(claim.study for claim in claims.listed().claims):
         own = by_name.get(name)
         judged = claims.judged(name, own.facts if own else [])
-        about = {"name": name, "title": f"Figure {name.removeprefix('fig')}", "built": own}
         label = own.label if own else ""
-        told = {"verdict": claims.verdict(judged, label), "synthetic": label}
-        made.append(about | {"claims": judged} | told)
+        made.append(
+            {
+                "name": name,
+                "title": f"Figure {name.removeprefix('fig')}",
+                "built": own,
+                "claims": judged,
+                "verdict": claims.verdict(judged, label),
+                "synthetic": label,
+            }
+        )
     return made
 
 

@@ -83,8 +83,8 @@ def test_a_loss_has_its_formula(
     formula = loss_formula(asked)
     assert "mean over the time of ‖U − U₀‖², divided by max ‖U₀‖," in formula
     assert formula.endswith("; of the motion alone, without the drive’s force")
-    told = {fact.key: fact for fact in checks.history_facts(asked, smile.design)}
-    best = next(fact for key, fact in told.items() if key.startswith("best_"))
+    facts = checks.history_facts(asked, smile.design)
+    best = next(fact for fact in facts if fact.key.startswith("best_"))
     assert best.note.endswith("; plus 0.5 times the relative error of the drive’s force")
 
 
