@@ -198,13 +198,13 @@ def drive_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
             xycoords="axes fraction", textcoords="offset points", color=style.CLOAKED,
             fontsize=style.SMALL, ha="right",
         )  # fmt: skip
-    if path.static:
-        if response.key == "reaction":
-            _traced(axes, study, path)
-        _eigenvalues(axes, study, path)
+    if path.static and response.key == "reaction":
+        _traced(axes, study, path)
     measured.forces(axes, study)
     if problem.objective.target == "rest":  # or another panel has told it
         _sides(axes, study)
+    if path.static:
+        _eigenvalues(axes, study, path)
 
 
 def _traced(axes: Axes, study: StudyResults, path: Abscissa) -> None:
@@ -226,7 +226,10 @@ def _traced(axes: Axes, study: StudyResults, path: Abscissa) -> None:
 
 
 def _eigenvalues(axes: Axes, study: StudyResults, path: Abscissa) -> None:
-    """Draws the smallest eigenvalue of the tangent, dotted, against an axis on the right."""
+    """Draws the smallest eigenvalue of the tangent, dotted, against an axis on the right.
+
+    Both axes have their zero at the same height, in the lower half.
+    """
     box, margin = axes.get_position(), RIGHT_AXIS / style.TWO_COLUMNS
     axes.set_position((box.x0, box.y0, box.width - margin, box.height))
     right, mean = axes.twinx(), over_cases(study.problem, 1e3 * study.response["eigenvalue"])
@@ -235,7 +238,10 @@ def _eigenvalues(axes: Axes, study: StudyResults, path: Abscissa) -> None:
         right.plot(path.values, mean.sel(structure=name), color=colour, lw=1.0, ls=":")
     # below the legend that tells measured curves from simulated ones
     room = 1.5 if study.recordings and study.problem.objective.target == "rest" else 1.05
-    right.set(ylim=(0.0, room * max(0.0, float(mean.max())) or None), ylabel="Eigenvalue (N/m)")
+    low, high = axes.get_ylim()
+    high = axes.set_ylim(low, max(high, -low))[1]
+    top = room * max(0.0, float(mean.max())) or 1.0
+    right.set(ylim=(low / high * top, top), ylabel="Eigenvalue (N/m)")
     right.yaxis.set_major_locator(MaxNLocator(4))
 
 

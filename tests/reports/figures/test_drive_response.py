@@ -8,6 +8,7 @@ from matplotlib.patches import ArrowStyle, FancyArrowPatch
 
 from pipeline.problem import selected_units
 from pipeline.problem.sections import ForceDrive, RotationDrive, TimeSeriesDrive, TorqueDrive
+from reports.figures.loading_path import abscissa, curves
 from reports.figures.loading_path.drive_response import drive_response
 from reports.figures.loading_path.structure_panels import rest_panel
 from reports.study import StudyResults
@@ -86,3 +87,19 @@ def test_a_drive_is_answered_by_what_is_conjugate_to_it(
     assert shown in [*words, *(text.get_text() for text in drawn.texts)]
     assert axis in [axes.get_ylabel() for axes in drawn.axes]
     assert key in values(study)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_force_and_eigenvalue_share_a_zero_line(smile: StudyResults, sign: float) -> None:
+    """Tell by it where the eigenvalue vanishes, also of forces against the drive."""
+    turned = smile.response.assign(reaction_force=sign * smile.response["reaction_force"])
+    study = dataclasses.replace(smile, datasets={**smile.datasets, "response": turned})
+    axes = (figure := Figure()).add_subplot()
+    curves.drive_panel(axes, study, abscissa.abscissa_of(study.problem, study.response))
+    _, right = figure.axes
+    places = [each.transData.transform((0.0, 0.0))[1] for each in (axes, right)]
+    assert places[0] == pytest.approx(places[1])
+    top, middle = axes.bbox.y1, (axes.bbox.y0 + axes.bbox.y1) / 2
+    assert axes.bbox.y0 < places[0] < middle + 1e-6
+    drawn = [line.get_ydata() for line in right.lines]
+    assert right.transData.transform((0.0, np.max(drawn)))[1] < top
