@@ -125,6 +125,7 @@ def path_facts(problem: Problem, design: xr.Dataset, response: xr.Dataset) -> It
     for name in (str(name) for name in response["structure"].values):
         part, words = response.sel(structure=name), display_name(problem, name).lower()
         void, of = float(np.degrees(part["min_void_angle"].min())), {"name": name, "words": words}
+        of["when"] = "of all loads" if problem.static else "at any time"
         yield _told("void_angle_{name}", void, **of)
         yield _told("gap_{name}", float(part["min_gap"].min()), **of)
         yield _told("overlaps_{name}", int(part["overlaps"].max()), **of)

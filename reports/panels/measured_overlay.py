@@ -87,14 +87,16 @@ def _clip(
     )
 
 
-def caption(recordings: Sequence[RecordedMotion], place: str = "") -> str:
+def caption(recordings: Sequence[RecordedMotion], place: str = "", *, banded: bool = True) -> str:
     """Tells what a figure with recordings says of them, as HTML; nothing without.
 
-    Snapshots of an experiment have their `place` by those of its simulation, if there are any.
+    Snapshots of an experiment have their `place` by those of its simulation, if there are any;
+    bands are told of where they are drawn.
     """
     if not recordings:
         return ""
     told = [*["snapshots"] * bool(place), "experiment"]
     told += ["synthetic"] * any(each.synthetic for each in recordings)
-    words = {"label": SYNTHETIC_LABEL, "level": 100 * recordings[0].level, "place": place}
+    bands = _PROSE["bands"].format(level=100 * recordings[0].level) if banded else ""
+    words = {"label": SYNTHETIC_LABEL, "bands": bands, "place": place}
     return "".join(f" {_PROSE[name].format_map(words)}" for name in told)

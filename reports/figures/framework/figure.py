@@ -58,7 +58,8 @@ def framework_figure(study: StudyResults) -> PanelFigure:
             _PROSE["d"],
         ),
     ]
-    return PanelFigure(HEIGHT, panels, remark=measured_overlay.caption(study.recordings))
+    remark = measured_overlay.caption(study.recordings, banded=False)
+    return PanelFigure(HEIGHT, panels, remark=remark)
 
 
 def _problem(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
@@ -110,12 +111,13 @@ def _loop(figure: Figure, design: xr.Dataset) -> None:
         history = design.sel({"method": method})
         loss = history["loss"].where(history["accepted"] > 0).dropna("evaluation")
         colour = style.METHOD_COLOURS.get(str(method), style.GREY)
-        axes.plot(loss["evaluation"], loss, color=colour)
+        axes.plot(loss["evaluation"], loss, color=colour, label=str(method).upper())
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(LogLocator())
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_ylabel("Loss $J$", labelpad=1.0)
     axes.set_xlabel("Evaluation", labelpad=1.0)
+    axes.legend(loc="upper right", ncols=2, fontsize=style.SMALL, borderaxespad=0.0)
 
 
 def _lying(structure: RigidUnits) -> int:

@@ -1,11 +1,13 @@
 """Composes several studies side by side: structures at the start and at full load, and curves."""
 
+import re
 from collections.abc import Iterator, Sequence
 from itertools import count
 
 from matplotlib.figure import Figure
 
-from reports.base import style
+from reports.base import prose, style
+from reports.figures import loading_path
 from reports.figures.loading_path import (
     UnitColouring,
     abscissa_of,
@@ -19,6 +21,7 @@ from reports.figures.loading_path import (
 from reports.panels import Panel, PanelFigure
 from reports.study import StudyResults, display_name
 
+_PROSE = prose(__file__)
 PER_BAND = 2
 """Studies beside one another, each with its altered and its cloaked structure."""
 
@@ -47,8 +50,10 @@ def several_studies_figure(studies: Sequence[StudyResults]) -> PanelFigure:
     for study in studies:
         panels += _curves(study, places, len(bands) * tall, letters)
     draft = [reason for study in studies for reason in study.draft]
+    colours = re.sub(r"_(\w)", r"<sub>\1</sub>", shade.field.label)
+    remark = f" {_PROSE['snapshots'].format(shade=colours)}"
     height = len(bands) * tall + -(-n_curves // PER_ROW) * CURVES + 1.0
-    return PanelFigure(height, panels, draft)
+    return PanelFigure(height, panels, draft, remark)
 
 
 def _band(
@@ -64,10 +69,12 @@ def _band(
     at = (top + 9.5, side)
     starts = [len(columns) + 2 * k for k in range(len(band))]
     columns += [(study, name) for study in band for name in ("altered", "cloaked")]
-    yield Panel((next(letters), "", 0.0, top))
+    if len(columns) > 2 * len(band):
+        yield Panel((next(letters), "Reference", 0.0, top), None, _PROSE["reference"])
     draws = [*([None] * (len(band) - 1)), lambda figure: _structures(figure, columns, shade, *at)]
     for study, start, draw in zip(band, starts, draws, strict=True):
-        yield Panel((next(letters), style.literal(heading(study)), LEFT + start * side, top), draw)
+        head = next(letters), style.literal(heading(study)), LEFT + start * side, top
+        yield Panel(head, draw, _PROSE["structures"].format(name=heading(study)))
 
 
 def _structures(
@@ -111,6 +118,8 @@ def _curves(
     """Yields measure and contraction of a study, at the next places in rows of four panels."""
     way, measure = abscissa_of(study.problem, study.response), measures.measure_of(study.problem)
     width = style.TWO_COLUMNS / PER_ROW
+    label = f"{measure.label[0].lower()}{measure.label[1:]}"
+    words = {"name": heading(study), "measure": label, "marks": loading_path.marks([study])}
     for half, title in enumerate(_curve_titles(study)):
         row, column = divmod(next(places), PER_ROW)
         left, y = column * width, top + row * CURVES
@@ -122,6 +131,5 @@ def _curves(
             else:
                 curves.contraction_panel(axes, study, way)
 
-        yield Panel(
-            (next(letters), f"{style.literal(heading(study))}, {title.lower()}", left, y), draw
-        )
+        head = next(letters), f"{style.literal(heading(study))}, {title.lower()}", left, y
+        yield Panel(head, draw, _PROSE[("measure", "contraction")[half]].format_map(words))

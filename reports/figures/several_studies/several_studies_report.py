@@ -1,7 +1,6 @@
 """Makes the report of several studies: facts and tables by study, one animation of all."""
 
 import argparse
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -47,7 +46,7 @@ def several_studies_report(
         lead=asked.doc.strip(),
         credit=_credit(studies),
         figure_title="Figure",
-        caption=_caption(studies),
+        caption=figure.caption,
         headline=headline,
         claimed=name if (preset := studies[0].preset) is None else f"{name}@{preset}",
     )
@@ -84,18 +83,6 @@ def _credit(studies: Sequence[StudyResults]) -> str:
         for name, variant in papers.items()
     )
     return source + loading_path.credit(None)
-
-
-def _caption(studies: Sequence[StudyResults]) -> str:
-    names = ", ".join(heading(study).lower() for study in studies)
-    labels = (measures.measure_of(study.problem).label for study in studies)
-    words = dict.fromkeys(f"{label[0].lower()}{label[1:]}" for label in labels)
-    return str(_PROSE["caption"]).format(
-        names=names,
-        shade=re.sub(r"_(\w)", r"<sub>\1</sub>", loading_path.fields(studies[0])[0].label),
-        measures=" and ".join(words),
-        marks=loading_path.marks(studies),
-    )
 
 
 def _animation(studies: Sequence[StudyResults]) -> Animation:

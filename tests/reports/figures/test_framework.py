@@ -28,7 +28,14 @@ def test_it_is_legible_and_tells_of_every_step(study: StudyResults) -> None:
         made = figure_assertions.drawn(figure.framework_figure(study).draw())
     figure_assertions.assert_legible(made)
     wanted = {"Reference", "Altered", "simulate", "optimised cloak", "filmed and tracked", *"abcd"}
+    wanted |= {"SQP"}
     assert wanted <= figure_assertions.words(made)
+
+
+def test_no_bands_are_told_of_as_none_are_drawn(filmed: StudyResults) -> None:
+    told = figure.framework_figure(filmed).caption
+    assert "dashed with markers" in told
+    assert "bands" not in told
 
 
 def test_its_page_works_from_disk(folder: Path) -> None:

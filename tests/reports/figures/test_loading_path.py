@@ -398,3 +398,12 @@ def test_evaluations_that_are_not_drawn_are_told(smile: StudyResults) -> None:
     assert "counted from the end of those by the angle law" in found["evaluations_sqp"].note
     each = 7 + asked.optimiser.methods.chosen["sqp"].evaluations
     assert f"up to {each} evaluations each, {3 * each} in all" in found["descents"].note
+
+
+def test_extremes_are_of_all_loads_or_at_any_time(study: StudyResults, smile: StudyResults) -> None:
+    asked, of = smile.problem, (smile.design, smile.response)
+    shaken = asked.model_copy(update={"drive": study.problem.drive})
+    for posed, when in ((asked, "of all loads"), (shaken, "at any time")):
+        notes = {fact.key: fact.note for fact in checks.path_facts(posed, *of)}
+        assert notes["void_angle_cloaked"] == when
+        assert notes["gap_cloaked"] == notes["overlaps_cloaked"] == f"{when}, by geometry"

@@ -61,6 +61,19 @@ def test_the_page_tells_each_study_and_shows_each_structure_once(report: Path) -
     ]  # fmt: skip
 
 
+def test_the_caption_tells_of_every_panel_in_its_order(pair: list[StudyResults]) -> None:
+    made = figure.several_studies_figure(pair)
+    assert all(panel.head[1] and panel.caption for panel in made.panels)
+    told = [
+        "<b>a</b> The intact", "<b>b</b> Smile, without", "<b>c</b> Frown, without",
+        "<b>d</b> Smile: mimicking error", "<b>e</b> Smile: how much nearer",
+        "<b>f</b> Frown: mimicking error", "<b>g</b> Frown: how much nearer", "true to scale",
+    ]  # fmt: skip
+    places = [made.caption.index(words) for words in told]
+    assert places == sorted(places)
+    assert several_studies_report("fig", ASKED, pair).values["caption"] == made.caption
+
+
 def test_warnings_bear_the_study_that_they_are_of(pair: list[StudyResults]) -> None:
     """Names none where they are of all."""
     warned = [
