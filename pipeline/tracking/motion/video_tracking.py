@@ -31,6 +31,7 @@ from pipeline.tracking.motion.unit_looks import GOOD, HIDDEN, POOR_FIT
 from pipeline.tracking.reference_frame import (
     CameraCalibration,
     RecordingSetup,
+    RestPlaces,
     StillFrames,
     ambiguity_text,
     average_at_rest,
@@ -105,7 +106,7 @@ def track_video(
     check_outlines(specimen, ways[0], calibration)
     if (seen := orientation_text(calibration.camera)) != "upright":
         LOG.warning("the specimen is %s; motions are in the design's own frame", seen)
-    offset = _centre_offset(shown.image, specimen, ways[0], calibration, setup.kind)
+    places = _centre_places(shown.image, specimen, ways[0], calibration, setup.kind)
     tracker = _tracker(shown, specimen, calibration, setup)
     rows, ended = _track_frames(shown.frames, tracker, tell)
     times, numbers, motion, sigmas, qualities, same, likeness, shares = (
@@ -134,8 +135,8 @@ def track_video(
                 " in the first frame",
                 100 * unsure.mean(),
             )
-    _count_from_rest(motion, rest, offset)
-    missed += _lens_variance(specimen, calibration, motion)
+    _count_from_rest(motion, rest, np.nan_to_num(places.offset).astype(np.float32))
+    missed += places.swing_variance(motion[..., 2]) + _lens_variance(specimen, calibration, motion)
     remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     qualities[np.isnan(motion[..., 0]) & (qualities == GOOD)] = HIDDEN  # as the supports are
     faults = timing_faults(time, motion, sigmas, same)
@@ -200,14 +201,14 @@ def _count_from_rest(motion: Reals, count: int, offset: Singles) -> None:
     motion[..., :2] += arm_swing(motion[..., 2], offset)
 
 
-def _centre_offset(
+def _centre_places(
     image: Picture,
     specimen: SpecimenOutlines,
     detection: LatticeDetection,
     calibration: CameraCalibration,
     kind: str,
-) -> Singles:
-    """Measures how far (units, 2) bare units rest off their design's places, mm.
+) -> RestPlaces:
+    """Measures where bare units rest; others are taken to where the design has them.
 
     Templates turn about these places, so what the middle of such a unit swings about its place is
     missing from its shift. Of others it is not known: their outlines may be those of what was glued
@@ -218,9 +219,8 @@ def _centre_offset(
         detection = replace(detection, camera=camera)
         kind = classify_markings(image, specimen, detection, 1 / calibration.pixel)
     if kind != "bare":
-        return np.zeros((specimen.count, 2), np.float32)
-    seen = camera.unproject(camera.project(specimen.centre) + calibration.residual)
-    return np.nan_to_num(seen - specimen.centre).astype(np.float32)
+        return RestPlaces.by_design(specimen.count)
+    return calibration.rest
 
 
 def _track_frames(

@@ -6,5 +6,6 @@ from .recognition import ambiguity_text as ambiguity_text
 from .recognition import check_outlines as check_outlines
 from .recognition import outlines_seen as outlines_seen
 from .recognition import recognise as recognise
+from .rest_places import RestPlaces as RestPlaces
 from .still_frames import StillFrames as StillFrames
 from .still_frames import average_at_rest as average_at_rest

@@ -28,6 +28,7 @@ from pipeline.tracking.geometry import (
     fit_camera,
     pixel_noise,
 )
+from pipeline.tracking.reference_frame.rest_places import RestPlaces, estimate_rest_places
 from sim.core import Floats, Mask
 
 BLURS = (0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 2.9)
@@ -54,7 +55,8 @@ class CameraCalibration(NamedTuple):
     grid: TemplateGrid  # nodes for templates
     blur: float  # standard deviation of the blur at edges, mm
     pixel: float  # size of a pixel at the middle of the specimen, mm
-    residual: Floats  # (units, 2) where the units are seen less where they should be, px
+    rest: RestPlaces  # of the units
+    residual: Floats  # (units, 2) where the units rest less where they should be, px
     depth: Depth | None  # of thick units whose walls are of the shade of their faces
     bright: bool  # whether the units are brighter than what is behind them
     outlines: PoseFits  # how these were fitted, from where the design has them
@@ -93,8 +95,9 @@ def calibrate_camera(
     """Refines the camera of a detection on the outlines of all units.
 
     The specimen is taken to be at rest where the design has it; what the units deviate from it
-    is their own tolerance and stays in the residual. Where the set-up tells of thick units, their
-    outlines are those of faces and walls together, if that is what the frame shows.
+    is their own tolerance, and stays in the residual as far as outlines tell it. Where the set-up
+    tells of thick units, their outlines are those of faces and walls together, if that is what the
+    frame shows.
     """
     camera, gain = with_distortion(specimen, detection).camera, _gain(image)
     pixel, blocks = _pixel(specimen, camera), block_places(camera)
@@ -136,10 +139,11 @@ def calibrate_camera(
         if turn < _ROUNDS:
             sigma = max(_EDGE_SIGMA, pixel_noise(*shown, camera))
             camera = fit_camera(*shown, camera.size, sigma, camera)
-    residual = seen - camera.project(specimen.centre)
-    alike = cameras_alike(*shown, camera)
+    rest = estimate_rest_places(fits)
+    residual = camera.project(specimen.centre + rest.offset) - camera.project(specimen.centre)
+    alike, size = cameras_alike(*shown, camera), (blur * pixel, pixel)
     return CameraCalibration(
-        camera, grid, blur * pixel, pixel, residual, depth, detection.bright, fits, alike
+        camera, grid, *size, rest, residual, depth, detection.bright, fits, alike
     )
 
 

@@ -99,14 +99,15 @@ def _lines(track: xr.Dataset, found: TrackQuality) -> Iterator[tuple[str, str, s
         yield f"Scatter in {found.resting} frames at rest", *_accuracy(found.floor, found.pixel)
     else:
         yield "Scatter at rest", "not known", "no frames at rest in the beginning"
-    yield "First frame less design", f"{found.residual:.3f} px", "of the specimen's own make"
+    own = "of the specimen's own make, as far as outlines tell it"
+    yield "First frame less design", f"{found.residual:.3f} px", own
     yield "Units lost", f"{100 * found.lost.sum(axis=1).mean():.3g} %", "of units and frames"
     for label, numbers in (("Repeated", found.duplicates), ("Dropped", found.dropped)):
         told = ", ".join(map(str, numbers[:12])) + (", …" if len(numbers) > 12 else "")
         yield f"{label} frames", str(len(numbers)), told
-    own = f"{100 * found.stream.alone:.0f} % of the frames are held whole"
+    whole = f"{100 * found.stream.alone:.0f} % of the frames are held whole"
     rest = "" if found.stream.alone > 0.995 else ", the others as changes"
-    yield "Codec", found.stream.codec, own + rest
+    yield "Codec", found.stream.codec, whole + rest
 
 
 def _accuracy(of: np.ndarray, pixel: float) -> tuple[str, str]:
