@@ -23,4 +23,4 @@ draft, default, tight = errors.values()
 
 figure, axes = panels(1)
 axes.semilogy(list(errors), list(errors.values()), "o-", color="black")
-axes.set(xlabel="accuracy", ylabel="relative change at half the steps")
+axes.set(xlabel="accuracy", ylabel="relative change\nat half the steps")

@@ -28,3 +28,5 @@ from .formulas import loss_formula as loss_formula
 from .formulas import weighted_force as weighted_force
 from .measured_constants import constants_facts as constants_facts
 from .recording_facts import intervals as intervals
+from .rounded_intervals import rounded as rounded
+from .rounded_intervals import span as span

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from reports.facts.fact_records import Fact, facts_of
+from reports.facts.rounded_intervals import rounded, span
 from reports.study import StudyResults
 
 ORDER = ("vertices", "stiffness", "together", "common", "geometry")
@@ -57,7 +58,8 @@ def worst_copy_fact(key: str, label: str, unit: str, found: Sequence[Spread]) ->
         note = in_words(worst.noise)
         if worst.failed:
             note += f"; {worst.failed} of {worst.count + worst.failed} copies failed, not counted"
-        yield _told("{key}_copies", worst.high, note=note, **told)
+        shown = rounded(worst.high, (worst.low, worst.high), unit)
+        yield _told("{key}_copies", worst.high, shown, note=note, **told)
 
 
 def loss_facts(study: StudyResults) -> Iterator[Fact]:
@@ -73,8 +75,10 @@ def spread_facts(label: str, unit: str, found: Sequence[Spread]) -> Iterator[Fac
     """Yields the median of a number over the copies of each kind."""
     for spread in found:
         key = re.sub(r"\W+", "_", spread.noise).strip("_")
-        told = {"what": label, "noise": in_words(spread.noise), "unit": unit}
-        yield _told("copies_{key}", spread.middle, key=key, spread=spread, **told)
+        ends = (spread.low, spread.high)
+        told = {"what": label, "noise": in_words(spread.noise), "unit": unit, "ends": span(ends)}
+        shown = rounded(spread.middle, ends, unit)
+        yield _told("copies_{key}", spread.middle, shown, key=key, spread=spread, **told)
 
 
 def in_words(noise: str) -> str:

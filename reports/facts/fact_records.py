@@ -68,7 +68,7 @@ def facts_of(module: str) -> Callable[..., Fact]:
         )
         key = key.format_map(words)
         if unit == "share":
-            return share(key, label, value, paper, note)
+            value, unit, ours = 100.0 * value, "%", ours or percent(value)
         ours = ours or worded(value, unit, row.get("digits", 4))
         return Fact(key, label, value, unit, ours, paper, note)
 
@@ -105,7 +105,11 @@ def within(value: float, unit: str, digits: int) -> str:
 
 def worded(value: float, unit: str, digits: int) -> str:
     """Returns number and unit as they are printed; tiny rounding leftovers are zero."""
-    text = "0" if abs(value) < 1e-9 else f"{value:.{digits}g}"
+    return printed("0" if abs(value) < 1e-9 else f"{value:.{digits}g}", unit)
+
+
+def printed(text: str, unit: str) -> str:
+    """Sets a number that Python has written, with its unit: powers of ten, minus sign."""
     if "e" in text:
         mantissa, exponent = text.split("e")
         text = f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}"

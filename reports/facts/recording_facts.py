@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from reports.facts.fact_records import Fact, facts_of, grouped, worded
+from reports.facts.rounded_intervals import rounded, span
 from reports.study import RecordedMotion
 from sim.core import Floats
 
@@ -22,14 +23,14 @@ def recorded_facts(recordings: Sequence[RecordedMotion]) -> list[Fact]:
     ]
 
 
-def intervals(measured: Floats, predicted: Floats, level: float, unit: str = "") -> str:
+def intervals(measured: Floats, predicted: Floats, level: float, unit: str = "1") -> str:
     """Finds the ends (2,) of an interval, and of that which imperfect specimens span, in words.
 
     That holds a part `level` of them.
     """
-    words = f"95 %: {measured[0]:.3g} to {measured[1]:.3g}{unit}"
+    words = f"95 %: {span(measured, unit)}"
     if np.isfinite(predicted).all():
-        words += f"; predicted, {100 * level:g} %: {predicted[0]:.3g} to {predicted[1]:.3g}{unit}"
+        words += f"; predicted, {100 * level:g} %: {span(predicted, unit)}"
     return words
 
 
@@ -41,9 +42,10 @@ def _facts(recording: RecordedMotion) -> Iterator[Fact]:
         off = {side: data["rmse"].sel(side=side, dof=dof) for side in ("simulated", "nominal")}
         value, low, high = (float(each) for each in off["simulated"].values)
         stated = float(off["nominal"].sel(estimate="value"))
-        words = {"symbol": symbol, "low": low, "high": high, "stated": stated}
-        unit = "rad" if dof == "theta" else "mm"
-        yield told("{name}_rmse_{dof}", value, dof=dof, of=unit, **words)
+        unit, ends = "rad" if dof == "theta" else "mm", (low, high)
+        words = {"symbol": symbol, "span": span(ends), "stated": rounded(stated, ends, unit)}
+        shown = rounded(value, ends, unit)
+        yield told("{name}_rmse_{dof}", value, shown, dof=dof, of=unit, **words)
     for key in ("nrmse", "noise_share"):
         values = data[key].sel(side="simulated", estimate="value").values
         pairs = zip(DOFS.values(), values, strict=True)
@@ -63,8 +65,8 @@ def _alignment(recording: RecordedMotion) -> Iterator[Fact]:
     if np.isfinite(gain):
         yield told("{name}_gain", gain)
     pixel, stated = float(data["pixel_size"]), float(data["pixel_size_stated"])
-    if np.isfinite(pixel / stated):
-        yield told("{name}_pixel", pixel / stated, pixel=pixel, stated=stated)
+    if np.isfinite(ratio := pixel / stated):
+        yield told("{name}_pixel", ratio, f"{ratio:.4f}", pixel=pixel, stated=stated)
     if samples := int(data["band_samples"]):
         usual = 100 * float(np.nanmean(data["band_coverage_usual"].values))
         covered = float(np.nanmean(data["band_coverage"].values))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from reports.facts import ABSENT, copies, worded
+from reports.facts import ABSENT, copies, rounded, worded
 from reports.figures.loading_path import measures, monte_carlo, over_cases
 from reports.page import RobustTable
 from reports.study import StudyResults
@@ -44,7 +44,13 @@ def robust_table(study: StudyResults) -> RobustTable | None:
         failed = f", {row[0].failed} failed" if row[0].failed else ""
         name = f"{copies.in_words(row[0].noise)} ({row[0].count} copies{failed})"
         rows.append(
-            (name, [_words(s.middle, s.high, q.unit) for s, q in zip(row, quantities, strict=True)])
+            (
+                name,
+                [
+                    _words(s.low, s.middle, s.high, q.unit)
+                    for s, q in zip(row, quantities, strict=True)
+                ],
+            )
         )
     absent = [(ABSENT, ABSENT)] * (len(quantities) - 1)
     rows += [(name, [*absent, words]) for name, words in _other_losses(study, quantities[-1].unit)]
@@ -87,9 +93,9 @@ def _other_losses(study: StudyResults, unit: str) -> Iterator[tuple[str, Words]]
     ):
         sound = None if made is None else made["loss"].values[(made["status"] == "ok").values]
         if sound is not None and sound.size:
-            middle, high = np.percentile(sound, (50, 95))
-            yield name % sound.size, _words(float(middle), float(high), unit)
+            low, middle, high = np.percentile(sound, (5, 50, 95))
+            yield name % sound.size, _words(float(low), float(middle), float(high), unit)
 
 
-def _words(middle: float, high: float, unit: str) -> Words:
-    return worded(middle, unit, 3), worded(high, unit, 3)
+def _words(low: float, middle: float, high: float, unit: str) -> Words:
+    return rounded(middle, (low, high), unit), rounded(high, (low, high), unit)

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from pipeline.comparison import compute_reduction, often_seen
 from reports.base import style
-from reports.facts import MEASURED, Fact, facts_of, intervals
+from reports.facts import MEASURED, Fact, facts_of, intervals, rounded
 from reports.figures.loading_path import measures
 from reports.figures.loading_path.abscissa import Abscissa, load_names
 from reports.figures.loading_path.measures import Measure
@@ -17,6 +17,8 @@ from reports.study import RecordedMotion, StudyResults, display_name, takes
 from sim.core import Floats
 
 Of = Callable[[xr.Dataset], xr.DataArray]
+Number = tuple[float, str]
+"""Of a fact: value, and it in words; without these it has the usual digits."""
 Under = tuple[str, str]
 """Ends of a fact's key and of its label that tell the load case."""
 
@@ -133,23 +135,24 @@ def _contraction_facts(
     for each in recorded:
         values, taken = curve(study, path, each, contraction), _taken(under, each.take)
         ends[each.name] = values[-1]
-        note = f"{each.source}; {_interval(each, path, 'contraction')}"
-        yield _of(study, "contraction_{structure}", each.structure, values[-1], taken, note=note)
+        number, words = _interval(each, path, ("contraction", "mm"), values[-1])
+        note = f"{each.source}; {words}"
+        yield _of(study, "contraction_{structure}", each.structure, number, taken, note=note)
     for take, some in takes(recorded):
         of = {each.structure: ends[each.name] for each in some}
         for name in [name for name in ("altered", "cloaked") if {name, "intact"} <= of.keys()]:
             off, taken = of[name] / of["intact"] - 1.0, _taken(under, take)
-            note = _change(some, path, "contraction", ("intact", name), sign=-1)
-            yield _of(study, "contraction_error_{structure}", name, off, taken, note=note)
+            number, note = _change(some, path, "contraction", ("intact", name), off)
+            yield _of(study, "contraction_error_{structure}", name, number, taken, note=note)
 
 
 def _of(
-    study: StudyResults, key: str, structure: str, value: float, under: Under, /, **words: object
+    study: StudyResults, key: str, structure: str, number: Number, under: Under, /, **words: object
 ) -> Fact:
     shown = display_name(study.problem, structure).lower()
     words |= {"measured": MEASURED, "structure": structure, "shown": shown}
     return _told(
-        f"{{measured}}{key}{{case}}", value, **words, **dict(zip(_CASE, under, strict=True))
+        f"{{measured}}{key}{{case}}", *number, **words, **dict(zip(_CASE, under, strict=True))
     )
 
 
@@ -169,27 +172,32 @@ def _measure_facts(
         values, taken = curve(study, path, each, measure.of), _taken(under, each.take)
         course = xr.DataArray(values, dims="time")
         ends[each.name] = end = float(measures.overall(study.problem, course))
-        note = f"{each.source}; {_interval(each, path, measure.key)}".removesuffix("; ")
-        yield _of(study, "{key}_{structure}", each.structure, end, taken, note=note, **of)
+        number, words = _interval(each, path, (measure.key, measure.unit), end)
+        note = f"{each.source}; {words}".removesuffix("; ")
+        yield _of(study, "{key}_{structure}", each.structure, number, taken, note=note, **of)
         most = float(np.nanmax(values))
-        yield _of(study, "{key}_{structure}_most", each.structure, most, taken, **of)
+        yield _of(study, "{key}_{structure}_most", each.structure, (most, ""), taken, **of)
     for take, some in takes(recorded):
         named = {each.structure: each.name for each in some}
         if not {"altered", "cloaked"} <= named.keys():
             continue
         gain = 1.0 - ends[named["cloaked"]] / ends[named["altered"]]
-        note = _change(some, path, measure.key, ("altered", "cloaked"))
-        words = {"measured": MEASURED, "key": measure.key, "what": measure.label}
-        words |= dict(zip(_CASE, _taken(under, take), strict=True))
-        yield _told("{measured}{key}_reduction{case}", gain, note=note, **words)
+        number, note = _change(some, path, measure.key, ("altered", "cloaked"), gain)
+        named = {"measured": MEASURED, "key": measure.key, "what": measure.label}
+        named |= dict(zip(_CASE, _taken(under, take), strict=True))
+        yield _told("{measured}{key}_reduction{case}", *number, note=note, **named)
 
 
-def _interval(recording: RecordedMotion, path: Abscissa, key: str) -> str:
-    """Finds the interval of a quantity at the end of the path, and what was predicted, in words."""
+def _interval(
+    recording: RecordedMotion, path: Abscissa, quantity: tuple[str, str], value: float
+) -> tuple[Number, str]:
+    """Words a quantity, of a key in a unit, at the end of the path: it, its interval, the band."""
+    key, unit = quantity
     if key not in _NAMES or not path.static:
-        return ""
-    measured, predicted = (_at_the_end(recording, path, key, side) for side in _SIDES)
-    return intervals(measured[1:], predicted[1:], recording.level)
+        return (value, ""), ""
+    measured, predicted = (_at_the_end(recording, path, key, side)[1:] for side in _SIDES)
+    words = intervals(measured, predicted, recording.level, unit)
+    return (value, rounded(value, measured, unit)), words
 
 
 def _change(
@@ -197,13 +205,17 @@ def _change(
     path: Abscissa,
     key: str,
     between: tuple[str, str],
-    sign: int = 1,
-) -> str:
-    """Returns the same of what the second of two structures takes from a quantity of the first."""
+    value: float,
+) -> tuple[Number, str]:
+    """Words likewise by which share two structures differ in a quantity.
+
+    It is what the second takes from the first, from the intact one what is added.
+    """
     if key not in _NAMES or not path.static:
-        return ""
-    ends = []
+        return (value, ""), ""
+    ends, sign = [], -100 if between[0] == "intact" else 100
     for side in _SIDES:
         of = {each.structure: _at_the_end(each, path, key, side) for each in recorded}
-        ends.append(np.sort(100 * sign * compute_reduction(*(of[name] for name in between))[1:]))
-    return intervals(ends[0], ends[1], recorded[0].level, " %")
+        ends.append(np.sort(sign * compute_reduction(*(of[name] for name in between))[1:]))
+    words = intervals(ends[0], ends[1], recorded[0].level, "%")
+    return (value, rounded(100 * value, ends[0], "%")), words

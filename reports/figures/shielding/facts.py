@@ -25,6 +25,7 @@ from reports.facts import (
     measures,
     percent,
     recording_facts,
+    rounded,
     worded,
 )
 from reports.figures.shielding.sweep_map import frequency_map
@@ -204,17 +205,20 @@ def recorded_facts(study: StudyResults) -> Iterator[Fact]:
         sides = spans[each.name] = [
             found.sel(source=source).values for source in ("measured", "simulated")
         ]
-        words = recording_facts.intervals(sides[0][1:], sides[1][1:], each.level, " mm")
+        words = recording_facts.intervals(sides[0][1:], sides[1][1:], each.level, "mm")
         of = {"structure": each.structure, "source": each.source} | _take(each.take)
-        yield _told("{start}peak_to_peak_{structure}{take}", float(sides[0][0]), words=words, **of)
+        span = float(sides[0][0])
+        shown = rounded(span, sides[0][1:], "mm")
+        yield _told("{start}peak_to_peak_{structure}{take}", span, shown, words=words, **of)
     for take, some in takes(recorded):
         named = {each.structure: spans[each.name] for each in some}
         if {"altered", "cloaked"} <= named.keys():
             gain, predicted = map(compute_reduction, named["altered"], named["cloaked"])
             ends = 100 * gain[1:], 100 * predicted[1:]
-            note = recording_facts.intervals(*ends, some[0].level, " %")
+            note = recording_facts.intervals(*ends, some[0].level, "%")
             of = {"note": note} | _take(take)
-            yield _told("{start}peak_to_peak_reduction{take}", float(gain[0]), **of)
+            shown = rounded(100 * float(gain[0]), ends[0], "%")
+            yield _told("{start}peak_to_peak_reduction{take}", float(gain[0]), shown, **of)
 
 
 def _take(number: int) -> dict[str, str]:

@@ -181,7 +181,8 @@ def test_pixels_are_told_over_those_stated_if_any(filmed: dict[str, StudyResults
 
     found = told(0.5)
     assert found["altered_1_pixel"].value == pytest.approx(0.98)
-    assert "0.49 mm" in found["altered_1_pixel"].note
+    assert found["altered_1_pixel"].ours == "0.9800"
+    assert "0.4900 mm" in found["altered_1_pixel"].note
     assert "altered_1_scale" not in found
     assert "altered_1_pixel" not in told(np.nan)
 
