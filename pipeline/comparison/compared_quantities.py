@@ -30,7 +30,8 @@ class Quantity(NamedTuple):
         apart = motion if self.less is None else motion - self.less[:, units]
         if self.over is None:
             return self.of(apart)
-        return self.of(apart) / largest_size(self.over[:, units], np.isfinite(apart).all(axis=-1))
+        known = np.asarray(np.isfinite(apart).all(axis=-1))
+        return self.of(apart) / largest_size(self.over[:, units], known)
 
 
 def list_quantities(
