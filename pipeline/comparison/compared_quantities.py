@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -98,7 +99,8 @@ def largest_size(squares: Floats, known: Mask) -> Floats:
         squares: (instants, n) of each unit.
         known: (..., n) the units that count.
     """
-    sets, place = np.unique(known.reshape(-1, squares.shape[1]), axis=0, return_inverse=True)
+    rows = known.reshape(prod(known.shape[:-1]), known.shape[-1])
+    sets, place = np.unique(rows, axis=0, return_inverse=True)
     means = np.array([known_mean(squares[:, each]).max() for each in sets], dtype=float)
     return np.asarray(np.sqrt(means)[place].reshape(known.shape[:-1]))
 

@@ -6,6 +6,7 @@ import pytest
 from pipeline.comparison import curves
 from pipeline.comparison.compared_quantities import (
     Quantity,
+    largest_size,
     mean_approach,
     mean_displacement,
     mean_rotation,
@@ -135,3 +136,9 @@ def test_copies_that_are_off_as_a_whole_leave_the_band_as_a_whole() -> None:
     apart = np.random.default_rng(1).standard_normal(seen.copies.shape)
     found = curves.expected_coverage(apart, seen.within(apart), seen.level)
     np.testing.assert_allclose(found, 0.95, atol=0.03)
+
+
+@pytest.mark.parametrize("shape", [(0, 7, 5), (7, 0)], ids=["no copies", "no units"])
+def test_nothing_has_no_size(shape: tuple[int, ...]) -> None:
+    found = largest_size(np.ones((2, shape[-1])), np.ones(shape, dtype=bool))
+    np.testing.assert_array_equal(found, np.full(shape[:-1], np.nan))
