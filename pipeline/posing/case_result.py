@@ -197,7 +197,7 @@ def _path(solved: Solved, at: Ints) -> _Path:
         return _Path(np.full(len(at), NOT_ASKED, dtype=np.int8), nothing, nothing)
     for load in record.snaps:
         share = load / solved.case.solver.output_times[-1]
-        LOG.warning("the structure snaps at %.4g of the load", share)
+        LOG.warning("the structure snaps at %.4g of the load path", share)
     if not record.stable.all():
         LOG.warning("%d equilibria are not stable", np.count_nonzero(record.stable == 0))
     ways = np.concatenate([[0], at[:-1] + 1])
@@ -216,7 +216,7 @@ def _traced(solved: Solved, scene: Scene) -> TracedPath:
         return TracedPath(np.full(1, np.nan), np.full((1, 2), np.nan), np.full(1, np.nan))
     loads = case.solver.output_times
     turns = ", ".join(f"{found.loads[at] / loads[-1]:.4g}" for at in found.turns)
-    LOG.info("the path that it leaves turns at %s of the load", turns or "none")
+    LOG.info("the path that it leaves turns at %s of the load path", turns or "none")
     motion = found.states[:, : 3 * top.n_units].reshape(len(found.loads), -1, 3)
     seen = observe(top, case.values, motion)
     return TracedPath(

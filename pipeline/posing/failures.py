@@ -102,7 +102,7 @@ class StoppedError(Exception):
         scene, error, place = self.scene, self.error, ""
         if scene.loads.static and error.step is not None:
             reached = 0.0 if error.step == 0 else float(self.asked[error.step - 1])
-            share = f"{reached / scene.loads.duration:.0%} of the load"
+            share = f"{reached / scene.loads.duration:.0%} of the load path"
             place = f" beyond {share}"
             if all(case.control is None for case in scene.loads.cases):
                 laws = [np.asarray(law(np.array([reached]))) for law in scene.loads.motions]

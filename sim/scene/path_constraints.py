@@ -54,7 +54,7 @@ def check_unsnapped(record: StaticRecord, load: float) -> None:
     """
     if record.jumped.any():
         share = np.nanmin(record.snapped) / load
-        raise SimulationError(f"the structure snaps at {share:.4g} of the load")
+        raise SimulationError(f"the structure snaps at {share:.4g} of the load path")
 
 
 class PathConstraints:
@@ -194,7 +194,7 @@ class PathConstraints:
         folds = found is not None and found.eigenvalue < 0.0
         if found is not None and folds:
             share, value = found.load / loads[-1], found.eigenvalue
-            LOG.debug("a snap at %.3g of the load: smallest eigenvalue %.2g N/mm", share, value)
+            LOG.debug("a snap at %.3g of the path: smallest eigenvalue %.2g N/mm", share, value)
         if record.jumped[way] and not folds:  # nothing leads out of this snap
             check_unsnapped(record, loads[-1])
         return _beyond(values) if found is None else (found.eigenvalue, found.slopes)

@@ -80,7 +80,7 @@ def test_a_path_that_ends_early_is_kept_so_far(
     stopping(0.8)
     told = failing("simulate", words(hole, tmp_path / "r.nc"))
     assert "the altered structure cannot be simulated beyond a driven displacement of 2.25" in told
-    assert "(75% of the load), look at unit [3, 2]: no equilibrium found" in told
+    assert "(75% of the load path), look at unit [3, 2]: no equilibrium found" in told
     assert f"all up to there is in {partial}" in told
     kept = datasets.read(partial, "response")
     assert kept["structure"].values.tolist() == ["intact", "altered", "cloaked"]

@@ -36,7 +36,7 @@ def crossed(unit: int) -> Floats:
 UNKNOWN: Any = ("uz",)
 PULLED = sim.LinearRamp(1.0, 1.0, 0.3)
 FORCES = np.full((5, 3), FORCE)
-MOVING = {"static": False, "frequency": 10.0, "steps": None, "samples": 3}
+MOVING: dict[str, Any] = {"static": False, "frequency": 10.0, "steps": None, "samples": 3}
 REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
     "beyond": (scene(sim.LinearRamp(-400.0, 1.0)), "400 mm, further than", "drive.amplitude"),
     "far beyond": (scene(sim.LinearRamp(1e300, 1.0)), "further than", "drive.amplitude"),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import sim
+from benchmarks.scenes import MATERIAL
 from sim.scene import concrete_parameters, estimated_errors, sample_times, scales
 from sim.scene.time_solver import RULES, different_drives, expected_steps
 from sim.solvers import FORCE, breakpoints, solve_case
@@ -16,7 +17,7 @@ from sim.structure import ContactModel
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 from tests.sim.scene.test_plan import design_of
 from tests.sim.scene.test_plan import scene as seven_by_seven
-from tests.sim.structures import MATERIAL, central, rotating_squares, taylor_orders
+from tests.sim.structures import central, rotating_squares, taylor_orders
 from tests.tables import some
 
 KNOTS = np.linspace(0.0, 0.2, 201)
