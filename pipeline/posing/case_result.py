@@ -261,7 +261,8 @@ def _at_rest(scene: Scene, vertices: Floats, angles: Floats) -> PosedStructure:
 def times_of(asked: Problem, scene: Scene) -> Times:
     """Merges the output times of a problem's response."""
     horizon = scene.loads.duration
-    shown = np.linspace(0.0, asked.response_time, asked.response.samples)
+    end = horizon if scene.loads.static else asked.response_time  # a path may be cut short
+    shown = np.linspace(0.0, end, asked.response.samples)
     integrated = sample_times(scene)
     sampled = (
         integrated if scene.objective.steps else np.linspace(0.0, horizon, asked.horizon.samples)
@@ -272,5 +273,5 @@ def times_of(asked: Problem, scene: Scene) -> Times:
     ends = np.cumsum([len(times) for times in wanted])[:-1]
     merged = np.asarray(every * 1e-9)
     if asked.measured:  # nothing is known beyond the end, by which the last may be rounded up
-        merged = np.minimum(merged, asked.response_time)
+        merged = np.minimum(merged, end)
     return Times(merged, *np.split(place, ends))
