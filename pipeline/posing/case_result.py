@@ -106,14 +106,18 @@ def measure(
         return float(measure(motion[None, at], case.values)[0])
 
     def other_loss(solved: Solved) -> float:
-        """Loss on the other branch of where the path branches; NaN if it does not."""
+        """Loss on the other branch of where the path branches; NaN if it does not, or ends."""
         case, record = solved.case, solved.record
         if not isinstance(record, StaticRecord) or not (record.jumped == BRANCHING).any():
             return np.nan
         assert isinstance(case.solver, StaticSolver)
         mirrored = replace(case.solver, sense=-case.solver.sense)
-        motion = solve_case(mirrored, case.values, case.drive)[0].reshape(solved.displacement.shape)
-        return loss_of(motion, case, times.integrated, None)
+        try:
+            motion, _, _ = solve_case(mirrored, case.values, case.drive)
+        except SimulationError as error:
+            LOG.warning("the other branch of load case %d: %s", case.number, error)
+            return np.nan
+        return loss_of(motion.reshape(solved.displacement.shape), case, times.integrated, None)
 
     def reduce(solved: Solved) -> CaseResult:
         case, motion = solved.case, solved.displacement

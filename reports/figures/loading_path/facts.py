@@ -47,6 +47,9 @@ from reports.figures.loading_path.measures import over_cases
 from reports.study import StudyResults, display_name, from_dataset
 from sim.core import Floats
 
+BRANCHED = 3
+"""Flag of a stable state that the path came to from where it branches."""
+
 _told = facts_of(__file__)
 
 
@@ -257,6 +260,8 @@ def _snap_facts(study: StudyResults, path: Abscissa, loss: float, unit: str) -> 
     losses = over_cases(study.problem, study.response["loss_other_branch"])
     other = float(losses.sel(structure="cloaked"))
     words, note = worded(loss, unit, 3), "at a limit point; the loss is that after it"
+    if (part["stability"] >= BRANCHED).any():
+        note = "where the path branches; the loss on the branch that it was followed along"
     if np.isfinite(other):
         words += f" or {worded(other, unit, 3)}"
         note = "where the path branches; the loss on either branch"

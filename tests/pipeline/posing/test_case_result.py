@@ -1,10 +1,17 @@
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 
-from pipeline.posing import scene_of, times_of
-from pipeline.posing.case_result import Times
+from pipeline.posing import case_result, measure, scene_of, times_of
+from pipeline.posing.case_result import PosedStructure, Times
 from pipeline.problem import load
+from sim.core import SimulationError
+from sim.quasistatics import BRANCHING, StaticSolver
+from sim.scene import cases_of, make_plan
+from sim.solvers import Solved, solve_case
 from tests.pipeline import static
 
 SERIES = "{ kind: time_series, units: right, file: push.csv }"
@@ -39,3 +46,30 @@ def test_no_time_is_beyond_the_end_of_a_file(tmp_path: Path) -> None:
     times = output_times(tmp_path, f"drive: {SERIES}", end)
     assert times.asked[-1] == end
     assert len(times.asked) == len(np.unique(times.asked))
+
+
+def test_a_failure_on_the_other_branch_leaves_the_case(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = static.write(tmp_path, static.HOLE, size=5)
+    asked = load(path)
+    scene = scene_of(asked, tmp_path).updated(reference=None)
+    times, vertices = times_of(asked, scene), scene.lattice.vertices
+    plan = make_plan(scene, vertices, times.asked, every_case=True)
+    (case,) = cases_of(scene, vertices, plan.solver)
+    assert isinstance(case.solver, StaticSolver)
+    found, rates, record = solve_case(case.solver, case.values, case.drive)
+    branched = replace(record, jumped=np.full_like(record.jumped, BRANCHING))
+    shape, sense = (-1, scene.lattice.n_units, 3), case.solver.sense
+
+    def stuck(solver: StaticSolver, *of: Any) -> Any:  # noqa: ANN401  (as the real one)
+        if solver.sense != sense:
+            raise SimulationError("no equilibrium found")
+        return solve_case(solver, *of)
+
+    monkeypatch.setattr(case_result, "solve_case", stuck)
+    solved = Solved(case, found.reshape(shape), rates.reshape(shape), branched)
+    outcome = measure(PosedStructure(scene, vertices), times, None)(solved)
+    assert np.isnan(outcome.loss_other_branch)
+    assert outcome.loss > 0.0
+    assert "the other branch of load case 0: no equilibrium found" in caplog.text

@@ -289,6 +289,9 @@ def test_a_jump_is_marked_and_a_snap_is_a_headline(shield: StudyResults) -> None
     response["snap"][1, 0, 4] = float(response["time"][4])
     told = changed(shield, "response", response)
     assert values(told)["snaps"].ours == "snaps at 7.5 mm: 0.05 N mm"
+    response["stability"][1, 0, 4] = 3
+    told = changed(shield, "response", response)
+    assert values(told)["snaps"].note.endswith("the branch that it was followed along")
     response["loss_other_branch"][1, 0] = 0.07
     assert values(told)["snaps"].ours == "snaps at 7.5 mm: 0.05 N mm or 0.07 N mm"
     text = figure.loading_path_text(told, "", list(values(told).values()))
