@@ -48,7 +48,7 @@ def _schema(dimension: units.Dimension) -> WithJsonSchema:
     return WithJsonSchema(
         {
             "type": "string",
-            "pattern": r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[A-Za-zµ°]",
+            "pattern": r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[A-Za-z\u00b5\u03bc°]",
             "description": f"{dimension.name} with its unit",
             "examples": [dimension.example],
         },

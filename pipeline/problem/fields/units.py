@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pint import UnitRegistry
 
 _DEFINITIONS = """
-micro- = 1e-6 = µ- = μ- = u-
+micro- = 1e-6 = µ- = \u03bc- = u-
 milli- = 1e-3 = m-
 centi- = 1e-2 = c-
 kilo- = 1e3 = k-
@@ -32,22 +32,35 @@ degree = 0.017453292519943295 * radian = deg = °
 tonne = 1e6 * gram = t
 minute = 60 * second = min
 inch = 0.0254 * meter = in = inches
+foot = 0.3048 * meter = ft = feet
+thou = 2.54e-5 * meter = mil
 hertz = 1 / second = Hz
 newton = 1000 * gram * meter / second ** 2 = N
 gram_force = 9.80665e-3 * newton = gf
 pound_force = 4.4482216152605 * newton = lbf
 pascal = newton / meter ** 2 = Pa
+psi = pound_force / inch ** 2
+ksi = 1000 * psi
 joule = newton * meter = J
+newton_meter = newton * meter = Nm
+newton_millimeter = 1e-3 * newton * meter = Nmm
+rpm = 1 / minute
 """
+KNOWN = (
+    "m, in, ft, mil or thou; s, min; g, t; rad, deg or °; Hz, rpm; N, gf, lbf; Pa, psi, ksi;"
+    " J, Nm, Nmm; with µ, m, c, k, M, G before them, in products of powers (N mm/rad^2, kg/m²)"
+)
+"""The units that quantities are given in, in words."""
 
 _LONGEST = 80
 _GREATEST = 1e12
 """In working units."""
 _NUMBER = r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
 # Only products of integer powers go to pint, whose own grammar would evaluate any arithmetic.
-_POWER = r"[A-Za-zµμ°]+(?:(?:\^|\*\*)-?\d)?"
+_POWER = r"[A-Za-z\u00b5\u03bc°]+(?:(?:\^|\*\*)-?\d)?"
 _UNIT = rf"(?P<unit>{_POWER}(?:\s*[*·/ ]\s*{_POWER})*)"
 _QUANTITY = re.compile(rf"\s*{_NUMBER}\s*(?:{_UNIT}|(?P<rest>\S.*?))?\s*")
+_RAISED = str.maketrans({"²": "^2", "³": "^3"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +97,13 @@ def _registry() -> UnitRegistry:
     return UnitRegistry(_DEFINITIONS.strip().splitlines())
 
 
+def _matched(text: str) -> re.Match[str] | None:
+    return None if len(text) > _LONGEST else _QUANTITY.fullmatch(text.translate(_RAISED))
+
+
 def split_quantity(text: str) -> tuple[float, str] | None:
     """Splits a quantity into number and unit ("" for none); None if the text is none."""
-    match = None if len(text) > _LONGEST else _QUANTITY.fullmatch(text)
+    match = _matched(text)
     return None if match is None or match["rest"] else (float(match["number"]), match["unit"] or "")
 
 
@@ -100,13 +117,13 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
     wanted = f'{dimension.name} is wanted here, e.g. "{dimension.example}"'
     if isinstance(text, bool) or not isinstance(text, str | int | float):
         raise UserError("not a quantity", remedy=wanted)
-    match = None if len(str(text)) > _LONGEST else _QUANTITY.fullmatch(str(text))
+    match = _matched(str(text))
     if match is None:
         raise UserError("not a number with a unit", remedy=wanted)
     if match["rest"] is not None:
         if re.match(r",\d", match["rest"]):
             raise UserError("a decimal comma", remedy=f"write a decimal point; {wanted}")
-        raise UserError(f"unknown unit {match['rest']!r}", remedy=wanted)
+        raise UserError(f"unknown unit {match['rest']!r}", remedy=f"{wanted}; known are {KNOWN}")
     if match["unit"] is None:
         raise UserError("the unit is missing", remedy=wanted)
     value = float(match["number"]) * _factor(match["unit"], dimension, wanted)
@@ -126,7 +143,7 @@ def _factor(unit: str, dimension: Dimension, wanted: str) -> float:
     try:
         given = registry.Quantity(1.0, registry.parse_units(unit))
     except (UndefinedUnitError, KeyError, ValueError) as error:  # a zeroth power, a number
-        raise UserError(f"unknown unit {unit!r}", remedy=wanted) from error
+        raise UserError(f"unknown unit {unit!r}", remedy=f"{wanted}; known are {KNOWN}") from error
     for accepted in (dimension.unit, *dimension.also):
         if given.is_compatible_with(accepted):
             return float(given.to(accepted).magnitude)

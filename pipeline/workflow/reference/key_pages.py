@@ -67,7 +67,7 @@ def pages() -> dict[str, str]:
 
 def _page(title: str, files: tuple[File, ...]) -> str:
     told: set[str] = set()
-    parts = [head(__file__, title=title)]
+    parts = [head(__file__, title=title, units=units.KNOWN)]
     for file in files:
         schema = file.model.model_json_schema(mode="validation")
         lead = f"{file.place}. {schema['description']}"

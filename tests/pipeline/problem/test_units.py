@@ -37,6 +37,12 @@ def test_examples_are_valid(dimension: Dimension) -> None:
     assert parse_quantity(dimension.example, dimension) > 0
 
 
+@cases("problem", "text, dimension")
+def test_an_unknown_unit_is_told_the_known_ones(text: str, dimension: str) -> None:
+    with refused("unknown unit", remedy=units.KNOWN):
+        parse_quantity(text, getattr(units, dimension))
+
+
 @given(text=st.text(alphabet="019.e+- mNskrad/^*()[]_°'\n", max_size=200))
 def test_any_text_is_read_or_refused(text: str) -> None:
     with suppress(UserError):
