@@ -177,11 +177,14 @@ def check_names(study: Study, root: Path = WORK) -> None:
 
 def _check_name(what: str, name: str, path: Path, root: Path) -> None:
     if not re.fullmatch(r"\w+", name):
+        remedy = f"name it {re.sub(r'[^0-9A-Za-z]+', '_', name).strip('_') or 'mine'}"
+        if "/" in name:
+            remedy = "give the name of a folder of experiments, not its path"
         raise UserError(
             f"the name of {what} may have letters, digits and underscores only",
-            file=path.relative_to(root),
+            file=path.relative_to(root) if path.is_relative_to(root) else path,
             value=name,
-            remedy=f"name it {re.sub(r'[^0-9A-Za-z]+', '_', name).strip('_') or 'mine'}",
+            remedy=remedy,
         )
 
 

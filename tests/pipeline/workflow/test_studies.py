@@ -4,7 +4,9 @@ import pytest
 
 from pipeline.runtime import UserError
 from pipeline.workflow.studies import (
+    Study,
     check_calibrations,
+    check_names,
     check_targets,
     families,
     joints,
@@ -34,6 +36,12 @@ def test_names_of_their_own_are_left_alone(tmp_path: Path) -> None:
     families.cache_clear()
     joints.cache_clear()
     check_targets(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["/elsewhere/mine", "experiments/mine"])
+def test_a_path_is_no_name_of_a_study(name: str, tmp_path: Path) -> None:
+    with refused("letters, digits and underscores only", remedy="not its path"):
+        check_names(Study.parse(name), tmp_path)
 
 
 @pytest.mark.parametrize(
