@@ -20,7 +20,8 @@ def drive_force(
     """Sums the forces (n_times, 2) on the units of a drive: held in place, and put on, N.
 
     In time they accelerate these units and overcome their damping as well. At kinks of the motion,
-    such as a start with a velocity, the impulses are left out.
+    such as a start with a velocity, the impulses are left out: of a `TimeSeries`, linear between
+    its points, all inertia.
 
     Args:
         scene: the scene.

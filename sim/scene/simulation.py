@@ -72,9 +72,10 @@ class Response:
 
     @cached_property
     def drive_force(self) -> Floats:
-        """(n_cases, n_times, 2) force on the units of each drive, N; in time with their inertia.
+        """(n_cases, n_times, 2) force on a drive's units, N; with inertia but in a `TimeSeries`.
 
-        Of motions that act together it is that on the first one's units.
+        Its velocity changes at its points alone. Of motions that act together it is the force on
+        the first one's units.
         """
         drives = [self.scene.loads.cases[case] for case in self.cases]
         return np.stack(

@@ -58,7 +58,7 @@ class PrescribedMotion(NamedTuple):
     def resistance(self, values: ConcreteParameters, times: Floats) -> Floats:
         """Forces (n_times, n, 3) that accelerate and damp its units where it displaces them.
 
-        They are in N and N mm.
+        They are in N and N mm. A `TimeSeries`, linear between its points, accelerates nothing.
         """
         rates, accelerations = (
             self._of_law(of, times).reshape(len(times), -1, 3)
