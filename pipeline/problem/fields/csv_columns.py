@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import math
 import re
@@ -68,11 +69,21 @@ def read_preamble(path: Path) -> list[str]:
 
 def _lines(path: Path) -> list[str]:
     try:
-        return read_bounded(path, _LARGEST).decode("utf-8-sig", errors="replace").splitlines()
+        return _decode(read_bounded(path, _LARGEST)).splitlines()
     except FileNotFoundError as error:
         raise UserError("no such file", file=path, remedy="check the path") from error
     except OSError as error:
         raise refusal(path, error) from error
+
+
+def _decode(stored: bytes) -> str:
+    """Decodes UTF-16 by its byte order mark, UTF-8 with or without one, else Windows-1252."""
+    if stored.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return stored.decode("utf-16", errors="replace")
+    try:
+        return stored.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return stored.decode("cp1252", errors="replace")
 
 
 def _separator(lines: list[str]) -> str:

@@ -1,3 +1,4 @@
+import codecs
 from pathlib import Path
 
 import numpy as np
@@ -120,3 +121,23 @@ def test_what_was_not_measured_is_a_gap(tmp_path: Path, gap: str) -> None:
     text += "# zeroed; 5\nMean;2,0\nEnd of test;\n"
     cell = LoadCellLog(file="load.csv", time="t", force="F")
     np.testing.assert_array_equal(load_cell.read(log(tmp_path, text), cell).force, [1.5, 2.5])
+
+
+@pytest.mark.parametrize(
+    "mark, encoding",
+    [
+        (codecs.BOM_UTF16_LE, "utf-16-le"),
+        (codecs.BOM_UTF16_BE, "utf-16-be"),
+        (codecs.BOM_UTF8, "utf-8"),
+        (b"", "utf-8"),
+        (b"", "cp1252"),
+    ],
+)
+def test_a_log_is_read_in_the_encodings_of_spreadsheets(
+    tmp_path: Path, mark: bytes, encoding: str
+) -> None:
+    path = tmp_path / "load.csv"
+    text = "Prüfstand 7, 21 °C\r\nZeit\tPrüfkraft [N]\r\n0,1\t1,5\r\n0,2\t2,5\r\n"
+    path.write_bytes(mark + text.encode(encoding))
+    found = load_cell.read(path, LoadCellLog(file="load.csv", time="Zeit", force="Prüfkraft"))
+    np.testing.assert_array_equal(found.force, [1.5, 2.5])
