@@ -124,7 +124,7 @@ def test_what_was_not_measured_is_a_gap(tmp_path: Path, gap: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "mark, encoding",
+    ("mark", "encoding"),
     [
         (codecs.BOM_UTF16_LE, "utf-16-le"),
         (codecs.BOM_UTF16_BE, "utf-16-be"),
