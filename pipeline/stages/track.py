@@ -104,6 +104,7 @@ def _points(path: Path, args: argparse.Namespace) -> None:
 def _init(video: Path, args: argparse.Namespace) -> None:
     import cv2
 
+    _check_positive("--pixel-size", args.pixel_size, "millimetres per pixel, or leave it out")
     design = datasets.read(args.design, "design")
     first, timed = _first_frame(video, args.start, args.frame_rate)
     scale = None if args.pixel_size is None else 1 / args.pixel_size
@@ -143,9 +144,7 @@ def _first_frame(video: Path, start: float, rate: float | None) -> tuple[Frame, 
     if not 0.0 <= start < np.inf:
         remedy = "give seconds since the file's first frame"
         raise UserError("no time of the video", key="--start", value=start, remedy=remedy)
-    if rate is not None and not 0.0 < rate < np.inf:
-        remedy = "give frames per second"
-        raise UserError("no rate of frames", key="--frame-rate", value=rate, remedy=remedy)
+    _check_positive("--frame-rate", rate, "frames per second")
     timed = True
     try:
         first = next(read_frames(video, start, rate=rate), None)
@@ -160,12 +159,19 @@ def _first_frame(video: Path, start: float, rate: float | None) -> tuple[Frame, 
     return first, timed
 
 
+def _check_positive(option: str, value: float | None, wanted: str) -> None:
+    if value is not None and not 0.0 < value < np.inf:
+        what, remedy = "no finite number above zero", f"give {wanted}"
+        raise UserError(what, key=option, value=value, remedy=remedy)
+
+
 def _pair(*pictures: Path, args: argparse.Namespace) -> None:
     import cv2
 
     if len(pictures) != 2 or args.out is None or len(args.at or []) % 2 or not args.at:
         usage = "python -m pipeline track pair FIRST.png LATER.png --at X Y --out motions.csv"
         raise UserError("two pictures, x and y of patches, and a file are wanted", remedy=usage)
+    _check_positive("--side", args.side, "pixels, such as 41")
     drawing = sidecar_path(args.out, *pictures, suffix=".png")
     before, after = read_pictures(*pictures)
     centres = np.reshape(args.at, (-1, 2))

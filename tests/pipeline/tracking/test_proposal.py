@@ -85,6 +85,16 @@ def test_a_video_is_looked_at_where_the_specimen_is_seen(
     assert "# frame_rate" not in (tmp_path / "film.yaml").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize("option", ["--pixel-size", "--frame-rate"])
+@pytest.mark.parametrize("value", ["0", "-0.3", "nan", "inf"])
+def test_options_above_zero_are_refused_otherwise(
+    option: str, value: str, words: list[str], failing: Failing
+) -> None:
+    told = failing("track", ["init", "film.mp4", *words, f"{option}={value}"])
+    for part in (option, f"value:  {float(value)}", "no finite number above zero", "per"):
+        assert part in told
+
+
 def test_of_pictures_a_proposal_asks_for_the_rate(tmp_path: Path, words: list[str]) -> None:
     folder = covered_at_first(tmp_path / "film")
     for name in ("0.png", "1.png"):

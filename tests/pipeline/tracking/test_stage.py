@@ -98,6 +98,7 @@ def test_a_command_finds_turned_patches(tmp_path: Path, capsys: pytest.CaptureFi
         (table, "--at X Y"),
         ([*table, "--at", "600", "9"], "outside of the picture"),
         ([*table, "--at", *at, "--out", "a.png"], "put beside it"),
+        ([*table, "--at", *at, "--side", "0"], "--side"),
     ):
         assert run_stage("track", wrong) == 2
         assert words in capsys.readouterr().err
