@@ -82,7 +82,7 @@ def check_reversed(file: str | None, record: RecordOptions | None) -> None:
     if turned and file is not None and file.endswith(".nc"):
         what = "a track's displacement counts in the test's direction"
         remedy = "write reversed: force, if the load cell counts the other way, or leave it out"
-        raise fault(what, remedy, "record.reversed")
+        raise fault(what, remedy, "record", "reversed")
 
 
 class ForceDisplacement(Section):
@@ -241,7 +241,7 @@ class Calibration(Section):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         for what, remedy, key in _faults(self):
-            raise fault(what, remedy, key)
+            raise fault(what, remedy, *key.split("."))
         return self
 
 

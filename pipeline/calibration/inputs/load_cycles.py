@@ -97,5 +97,5 @@ class LoadCycles(Section):
         for name in ("held", "driven"):
             if (unit := getattr(self.drive, name)) >= count:
                 what = f"no unit {unit}: the lattice has {count}, numbered from 0"
-                raise fault(what, f"give a number of at most {count - 1}", f"drive.{name}")
+                raise fault(what, f"give a number of at most {count - 1}", "drive", name)
         return self

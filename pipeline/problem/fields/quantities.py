@@ -19,10 +19,10 @@ FOLDER = "folder"
 _LONGEST = 300  # letters of what a file's reader complains of, which may cite what is no text
 
 
-def fault(what: str, remedy: str, key: str | None = None) -> PydanticCustomError:
-    """Builds a validation error with its remedy, and the key below the validated section."""
+def fault(what: str, remedy: str, *keys: str | int) -> PydanticCustomError:
+    """Builds a validation error with its remedy, and the keys below the validated section."""
     legible = "".join(letter if letter.isprintable() else "?" for letter in what[:_LONGEST])
-    told = {"what": legible, "remedy": remedy, "key": key}
+    told = {"what": legible, "remedy": remedy, "keys": keys}
     return PydanticCustomError("problem", "{what}", told)
 
 

@@ -49,7 +49,7 @@ class Section(BaseModel):
                 offered = [name for name, field in known.items() if not _is_internal(field)]
                 near = get_close_matches(str(key), offered, n=1, cutoff=0.8)
                 hint = f"did you mean {near[0]!r}? " if near else ""
-                raise fault("unknown key", f"{hint}known here: {', '.join(offered)}", key=str(key))
+                raise fault("unknown key", f"{hint}known here: {', '.join(offered)}", str(key))
         return data
 
 

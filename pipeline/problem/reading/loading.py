@@ -178,9 +178,8 @@ def explain_error(
     """Explains the first error of validation; `data` is the document with its preset."""
     first, *others = error.errors(include_url=False)
     keys = _real_keys(first["loc"], data, missing=_is_missing_key(first))
-    what, remedy, key = _in_words(first)
-    if key is not None:
-        keys = (*keys, key)
+    what, remedy, below = _in_words(first)
+    keys = (*keys, *below)
     if others:
         remedy += f" ({len(others)} more after this one)"
     return _user_error(document, preset, data, keys, what, remedy)
@@ -219,15 +218,15 @@ _WORDS = {
 }
 
 
-def _in_words(error: ErrorDetails) -> tuple[str, str, str | None]:
-    """Translates an error: the fault, the remedy, and a key below its place if there is one."""
+def _in_words(error: ErrorDetails) -> tuple[str, str, KeyPath]:
+    """Translates an error: the fault, the remedy, and the keys below its place."""
     context = error.get("ctx", {})
     if error["type"] == "problem":
-        return context["what"], context["remedy"], context["key"]
+        return context["what"], context["remedy"], context["keys"]
     if error["type"] == "missing" and not _is_missing_key(error):
-        return "too few items", "write it as [first, second]", None
+        return "too few items", "write it as [first, second]", ()
     what, remedy = _WORDS.get(error["type"], (error["msg"], "correct the value"))
-    return what, remedy.format_map(context), None
+    return what, remedy.format_map(context), ()
 
 
 def _is_missing_key(error: ErrorDetails) -> bool:

@@ -267,11 +267,11 @@ class Fabrication(Section):
         sunk = self.labels.depth + self.markers.depth * (self.markers.kind == "recess")
         if sunk > self.thickness / 2.0:
             what = f"letters and dots {sunk:g} mm deep take more than half of the thickness"
-            raise fault(what, f"keep them within {self.thickness / 2.0:g} mm", "labels.depth")
+            raise fault(what, f"keep them within {self.thickness / 2.0:g} mm", "labels", "depth")
         if self.print.first_layer_inset > self.minimum_wall / 2.0:
             what = "the first layer is drawn in by more than half of the thinnest wall"
             remedy = f"give at most {self.minimum_wall / 2.0:g} mm"
-            raise fault(what, remedy, "print.first_layer_inset")
+            raise fault(what, remedy, "print", "first_layer_inset")
         if self.shims.thickness + 2.0 * max(self.coupon) > _WIDEST_SLOT:
             what = f"the coupon has no room for slots wider than {_WIDEST_SLOT:g} mm"
             raise fault(what, "give smaller clearances", "coupon")
@@ -280,9 +280,9 @@ class Fabrication(Section):
         if self.shims.tabs is not None and self.shims.tabs.width > most:
             if most <= 0.0:
                 what = f"a cut of {self.laser.kerf:g} mm leaves no tabs that stand within the slots"
-                raise fault(what, f"give less than {widest:g} mm", "laser.kerf")
+                raise fault(what, f"give less than {widest:g} mm", "laser", "kerf")
             what = f"tabs of {self.shims.tabs.width:g} mm do not stand within the slots"
-            raise fault(what, f"give at most {most:g} mm", "shims.tabs.width")
+            raise fault(what, f"give at most {most:g} mm", "shims", "tabs", "width")
         return self
 
     @property

@@ -169,5 +169,5 @@ class VirtualRecording(Section):
         if self.sensor.exposure * self.rate > 1.0 + _ROUNDING:
             what = f"an exposure of {self.sensor.exposure:g} s is longer than a frame lasts"
             remedy = f"give {1 / self.rate:.3g} s at most, or a lower virtual.rate"
-            raise fault(what, remedy, "sensor.exposure")
+            raise fault(what, remedy, "sensor", "exposure")
         return self

@@ -34,6 +34,24 @@ def test_line_and_value_are_those_of_the_file_or_preset(refusal: Refusal, fig2: 
     assert max(map(len, str(error).splitlines())) < 200
 
 
+@pytest.mark.parametrize(
+    ("made", "key", "value"),
+    [
+        ("shims: {tabs: {}}\n  laser:\n    kerf: 3 mm", "laser.kerf", "3 mm"),
+        ("thickness: 2 mm\n  labels:\n    depth: 1.5 mm", "labels.depth", "1.5 mm"),
+        ("laser.kerf: 3 mm", "laser.kerf", "3 mm"),
+    ],
+)
+def test_a_fault_between_keys_has_line_and_value(
+    refusal: Refusal, made: str, key: str, value: str
+) -> None:
+    text = f"fabrication:\n  {made}\n"
+    error = refusal("constraints:", f"{text}constraints:")
+    lines = Path(str(error.file)).read_text(encoding="utf-8").splitlines()
+    assert (error.key, error.value) == (f"fabrication.{key}", value)
+    assert lines[int(str(error.line)) - 1].endswith(value)
+
+
 def test_an_unknown_preset_lists_those_there_are(fig2: Path) -> None:
     with pytest.raises(UserError, match="no preset 'quik'") as caught:
         load(fig2, "quik")
