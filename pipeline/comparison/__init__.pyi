@@ -8,6 +8,7 @@ from .comparison_dataset import describe_comparison as describe_comparison
 from .measured_side import often_seen as often_seen
 from .measured_side import prepare_measurement as prepare_measurement
 from .measured_side import select_frames as select_frames
+from .measured_side import untared_force as untared_force
 from .nominal_side import drive_direction as drive_direction
 from .nominal_side import find_axis as find_axis
 from .nominal_side import interpolate_response as interpolate_response

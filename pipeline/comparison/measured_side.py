@@ -1,5 +1,6 @@
 """Selects frames and units of a track to compare, and turns them into the design's frame."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,9 @@ MOST_FRAMES = 600
 LEAST_PER_PERIOD = 8
 COMPARED, HELD, PUSHED, ABSENT, LOST = range(5)
 
+_TARED = 0.05  # of the range of forces, by which one at rest may differ from zero
+_NOISY = 4.0  # standard deviations, likewise
+_NORMAL = 0.6745  # median of absolute normal numbers
 _SEEN = 0.5  # of the frames, or a unit counts as lost
 
 
@@ -107,6 +111,27 @@ def check_track(track: xr.Dataset, design: xr.Dataset, leading: Ints | None = No
         raise UserError(what, key="window", remedy=remedy)
     if seen.sum() < LEAST_FRAMES:
         raise too_few_frames(int(seen.sum()))
+
+
+def untared_force(force: Floats, resting: Mask) -> float:
+    """Finds the median of a load cell's force (frames,) at rest, N; NaN for one that is zero there.
+
+    It is zero within a share of the force's range, and within noise.
+    """
+    known = np.isfinite(force)
+    if not (known & resting).any():
+        return np.nan
+    still = force[known & resting]
+    least = max(_TARED * float(np.ptp(force[known])), _NOISY * _noise(still, force[known]))
+    found = float(np.median(still))
+    return found if abs(found) > least else np.nan
+
+
+def _noise(still: Floats, whole: Floats) -> float:
+    """Estimates a force's standard deviation by second differences: at rest, if it is so long."""
+    taken = still if len(still) >= LEAST_FRAMES else whole
+    bends = np.abs(np.diff(taken, 2))
+    return float(np.median(bends)) / (_NORMAL * math.sqrt(6.0)) if len(bends) else 0.0
 
 
 def _another(why: str) -> UserError:

@@ -10,7 +10,9 @@ from scipy.interpolate import CubicSpline
 from pipeline.comparison import alignment
 from pipeline.comparison.alignment import Lag, SampledMotion
 from pipeline.runtime import UserError
-from sim.core import Floats, Ints
+from sim.core import Floats, Ints, Mask
+
+_HARDLY = 0.01  # of the greatest load: none yet
 
 
 class ComparisonAxis(NamedTuple):
@@ -20,6 +22,12 @@ class ComparisonAxis(NamedTuple):
     branch: NDArray[np.int8]  # (frames,) which way the load goes
     lag: Lag | None  # of the drive; None for load, which has no time
     turn: float  # direction of the measured less that of the nominal drive, rad
+
+    @property
+    def resting(self) -> Mask:
+        """Tells the first frames (frames,), which the drive has not reached yet."""
+        begun = self.time > (_HARDLY * np.nanmax(self.time) if self.lag is None else 0.0)
+        return np.isfinite(self.time) & ~np.logical_or.accumulate(begun)
 
     def taken(self, kept: Ints) -> "ComparisonAxis":
         """Selects frames (n,) by number."""

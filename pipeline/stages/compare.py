@@ -3,6 +3,7 @@
 import argparse
 import json
 import logging
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -21,6 +22,7 @@ from pipeline.comparison import (
     prepare_measurement,
     select_frames,
     simulate_specimen,
+    untared_force,
 )
 from pipeline.datasets import provenance
 from pipeline.posing import read_design, scene_of, structures_of
@@ -79,6 +81,7 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     every = prepare_measurement(datasets.read(args.track, "track"), built, leading)
     axis = find_axis(every.time, every.drive, response, static=asked.static)
     frequency = np.nan if asked.frequency is None else asked.frequency
+    _check_zero(untared_force(every.force, axis.resting), recording, args.recording)
     kept = select_frames(axis.time, 1 / frequency)
     measured, shown = every.taken(kept), axis.taken(kept)
     way = drive_direction(response)
@@ -99,6 +102,18 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
             recording.pixel_size or np.nan,
         ),
     )
+
+
+def _check_zero(untared: float, recording: Recording, path: Path) -> None:
+    """Warns of a load cell that was not tared, unless the recording tells its zero."""
+    cell = recording.load_cell
+    if cell is not None and "zero" not in cell.model_fields_set and np.isfinite(untared):
+        LOG.warning(
+            "%s: load_cell.zero: the force is %.3g N before the drive begins; write `zero: start`"
+            " to take it off, or `zero: file` to keep it",
+            path,
+            untared,
+        )
 
 
 def chosen(response: xr.Dataset, recording: Recording) -> xr.Dataset:

@@ -107,6 +107,37 @@ def test_a_load_cell_that_counts_against_the_drive_is_told_of(
         assert ("write load_cell: {reversed: true}" in told) == (sign < 0)
 
 
+@pytest.mark.parametrize(
+    ("offset", "keys", "told"),
+    [
+        (0.0, "", False),
+        (0.5, "", True),
+        (-0.5, "", True),
+        (0.02, "", False),
+        (0.5, ", zero: file", False),
+        (0.5, ", zero: start", False),
+    ],
+)
+def test_a_load_cell_that_was_not_tared_is_told_of(
+    study: list[str],
+    film: xr.Dataset,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    offset: float,
+    keys: str,
+    told: bool,
+) -> None:
+    """Offsets are parts of the range of forces."""
+    given = [word for word in study if word != "--quiet"]
+    force = film["load_force"]
+    made = film.assign(load_force=force + offset * float(force.max() - force.min()))
+    options = written(made, tmp_path, f"load_cell: {{file: load.csv{keys}}}\n")
+    assert run_stage("compare", words(given, options, tmp_path)) == 0
+    warned = [line for line in capsys.readouterr().err.splitlines() if "load_cell.zero" in line]
+    assert len(warned) == told
+    assert all(part in line for line in warned for part in ("recording.yaml", " N ", "zero: start"))
+
+
 def test_a_response_of_another_design_is_refused(
     study: list[str], film: xr.Dataset, tmp_path: Path, failing: Failing
 ) -> None:
