@@ -173,7 +173,7 @@ def test_curves_are_over_the_units_of_interest_that_were_seen(
     told = datasets.read(tmp_path / "comparison.nc", "comparison")
     assert (told["use"].values[roi] == 1).any()
     kept = told["nominal"].isel(unit=roi & ~(seldom & (share > 0)))
-    turned = np.abs(kept.sel(dof="theta")).mean("unit")
+    turned = abs(kept.sel(dof="theta")).mean("unit")
     found = told["mean_rotation"].sel(source="nominal", estimate="value")
     np.testing.assert_allclose(found, turned, rtol=1e-5)
 

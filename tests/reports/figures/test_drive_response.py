@@ -101,5 +101,5 @@ def test_force_and_eigenvalue_share_a_zero_line(smile: StudyResults, sign: float
     assert places[0] == pytest.approx(places[1])
     top, middle = axes.bbox.y1, (axes.bbox.y0 + axes.bbox.y1) / 2
     assert axes.bbox.y0 < places[0] < middle + 1e-6
-    drawn = [line.get_ydata() for line in right.lines]
-    assert right.transData.transform((0.0, np.max(drawn)))[1] < top
+    drawn = max(np.asarray(line.get_ydata()).max() for line in right.lines)
+    assert right.transData.transform((0.0, drawn))[1] < top
