@@ -259,8 +259,9 @@ def _make_targets() -> tuple[str, ...]:
 def rule_names() -> tuple[str, ...]:
     """Lists the names of the rules, and of the folders of results that are no study's."""
     text = "".join(path.read_text() for path in sorted((ROOT / "pipeline/rules").glob("*.smk")))
-    found = re.findall(r"^rule (\w+):|\bresults/(\w+)/", text, flags=re.MULTILINE)
-    return tuple(sorted({rule or folder for rule, folder in found}))
+    folders = re.findall(r"\bresults/(\w+)/", text)
+    rules = re.findall(r"^rule (\w+):", text + (ROOT / "Snakefile").read_text(), re.MULTILINE)
+    return tuple(sorted({*rules, *folders}))
 
 
 def check_calibrations(root: Path = WORK) -> None:

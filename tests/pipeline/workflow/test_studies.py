@@ -56,7 +56,8 @@ def test_a_preset_called_like_a_product(preset: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["all", "fig1", "index", "sweep", "spectrum", "movies", "logs", "calibration"]
+    "name",
+    ["all", "fig1", "index", "no_target", "sweep", "spectrum", "movies", "logs", "calibration"],
 )
 def test_a_study_called_like_a_target_or_a_folder(name: str, tmp_path: Path) -> None:
     study(tmp_path, name)
