@@ -279,8 +279,7 @@ def _predictions(
     theirs = np.full(len(at), np.nan)
     if asked.simulated is not None:
         wanted = {asked.columns.displacement: units.LENGTH, asked.columns.force: units.FORCE}
-        known = csv_columns.read_quantities(folder / asked.simulated, wanted)
-        theirs = np.interp(at, *known.T)
+        theirs = within(at, csv_columns.read_quantities(folder / asked.simulated, wanted))
     along = ("predicted",)
     own, doubled, student = (bands[name] for name in ("", "doubled", "student"))
     return {
@@ -298,6 +297,11 @@ def _predictions(
         "inside": ((), int(own.holds(truth))),
         "width_to_student": ((), own.half_width / student.half_width),
     }
+
+
+def within(at: Floats, curve: Floats) -> Floats:
+    """Interpolates a curve (lines, 2) of displacement and force, NaN beyond its ends."""
+    return np.interp(at, *curve.T, left=np.nan, right=np.nan)
 
 
 def _mechanisms(ranked: Sequence[RankedMechanism]) -> dict[str, tuple]:

@@ -155,7 +155,7 @@ def _headline(made: xr.Dataset) -> Iterator[Mapping[str, str]]:
 
 
 def _rms(made: xr.Dataset, name: str) -> str:
-    return f"{100 * np.sqrt((relative_error(made, name) ** 2).mean()):.1f} %"
+    return f"{100 * np.sqrt(np.nanmean(relative_error(made, name) ** 2)):.1f} %"
 
 
 def _signed(made: xr.Dataset) -> str:
@@ -179,7 +179,8 @@ def prediction_errors(made: xr.Dataset) -> PageTable:
         band = {"median": ("low", "high"), "doubled_median": ("doubled_low", "doubled_high")}
         ends = [made[end].values[-1] for end in band.get(name, ())]
         told = f"{ends[0]:.1f} to {ends[1]:.1f} N" if ends else "none"
-        rows.append([what, _rms(made, name), *(f"{value:+.1f} %" for value in error), told])
+        shown = ("none" if np.isnan(value) else f"{value:+.1f} %" for value in error)
+        rows.append([what, _rms(made, name), *shown, told])
     heads = [f"at {x:.3g} mm" for x in displacement[at]]
     return PageTable(["Prediction", "rms", *heads, "Band at the end"], rows)
 

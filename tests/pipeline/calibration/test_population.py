@@ -277,3 +277,9 @@ def test_the_stored_constants_name_the_files_that_they_were_drawn_from(
         for path in (out, FILE.with_name(out.name))
     )
     assert stored == made
+
+
+def test_a_curve_that_others_simulated_ends_where_it_does() -> None:
+    curve = np.array([[1.0, 10.0], [2.0, 30.0]])
+    found = validation_study.within(np.array([0.9, 1.0, 1.5, 2.0, 2.1]), curve)
+    np.testing.assert_array_equal(found, [np.nan, 10.0, 20.0, 30.0, np.nan])

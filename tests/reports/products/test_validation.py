@@ -120,6 +120,15 @@ def test_errors_are_told_where_the_curve_was_measured() -> None:
     assert table.rows[0][2:-1] == [f"{value:+.1f} %" for value in error]
 
 
+def test_a_simulated_curve_tells_nothing_beyond_its_ends() -> None:
+    force = made_up()["measured"].values
+    made = made_up().assign(simulated=("predicted", np.append(1.1 * force[:-1], np.nan)))
+    *_, row = prediction_errors(made).rows
+    error = 0.1 * force[:-1] / force.max()
+    rms = 100 * np.sqrt(np.mean(error**2))
+    assert row[1:-1] == [f"{rms:.1f} %", *(f"{100 * value:+.1f} %" for value in error), "none"]
+
+
 def test_points_are_of_samples_whatever_their_names() -> None:
     """Holds for labels with an underscore, of which the mean over both is none."""
     curves = [f"shear_{name}" for name in ("run_1", "run_2", "run_1+run_2")]
