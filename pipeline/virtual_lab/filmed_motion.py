@@ -1,5 +1,6 @@
 """Samples a response at the instants that a video, and its load cell, show."""
 
+import json
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ _FINEST = 0.3  # px between the instants of an exposure
 _MOST = 9
 _NOISE_STREAM = 3
 """First word of the seed of a load cell's noise: no frame has it."""
+_TURNING = ("torque", "rotation")
 
 
 class FilmedMotion(NamedTuple):
@@ -93,8 +95,12 @@ def load_cell_log(one: xr.Dataset, asked: VirtualRecording, cell: VirtualLoadCel
     clock and ends a little after the video.
 
     Raises:
-        UserError: the video shows nothing of the response.
+        UserError: the video shows nothing of the response, or the drive has no direction.
     """
+    if _only_turns(one):
+        what = "the drive turns its units and has no direction, along which a load cell would weigh"
+        remedy = "leave load_cell out, or drive the problem by a displacement or a force"
+        raise UserError(what, key="virtual.load_cell", remedy=remedy)
     angle = np.deg2rad(float(one["direction"]))
     given = one["time"].values
     force = one["drive_force"].transpose("time", "xy").values @ [np.cos(angle), np.sin(angle)]
@@ -104,3 +110,10 @@ def load_cell_log(one: xr.Dataset, asked: VirtualRecording, cell: VirtualLoadCel
     pushed = np.interp(of_video.shown(time - cell.offset), given, force)
     random = np.random.default_rng([_NOISE_STREAM, asked.seed])
     return np.column_stack([time, pushed + cell.noise * random.standard_normal(len(time))])
+
+
+def _only_turns(one: xr.Dataset) -> bool:
+    """Tells a drive by a moment or a rotation, and a motion that displaces nothing."""
+    drive = json.loads(one.attrs["problem"]).get("drive", {})
+    first = drive.get("drives", [drive])[0]
+    return first.get("kind") in _TURNING or not one["drive_displacement"].values.any()

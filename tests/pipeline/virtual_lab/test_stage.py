@@ -1,4 +1,5 @@
 import csv
+import json
 import logging
 from pathlib import Path
 
@@ -90,6 +91,28 @@ def test_a_log_of_many_lines_in_a_millisecond_can_be_read(files: Path, tmp_path:
     assert run_stage("film", words) == 0
     clock = load_cell.read(out, LoadCellLog(file="load.csv")).clock
     np.testing.assert_allclose(clock, np.arange(len(clock)) / 24_000, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("drive", "moved"),
+    [
+        ({"kind": "torque"}, 1.0),
+        ({"kind": "rotation"}, 1.0),
+        ({"drives": [{"kind": "rotation"}, {"kind": "force"}]}, 1.0),
+        ({"kind": "time_series"}, 0.0),
+    ],
+)
+def test_a_drive_that_turns_is_not_weighed(
+    files: Path, tmp_path: Path, failing: Failing, drive: dict[str, object], moved: float
+) -> None:
+    made = datasets.read(files / "response.nc", "response")
+    made["drive_displacement"] *= moved
+    origin = {"problem": json.dumps({"drive": drive}), "problem_hash": "", "parents": "{}"}
+    held, asked = tmp_path / "response.nc", recording(tmp_path, load_cell={})
+    datasets.write(made, held, "response", origin)
+    words = ["weigh", str(asked), "--response", str(held), "--out", str(tmp_path / "load.csv")]
+    told = failing("film", words)
+    assert all(part in told for part in (str(asked), "virtual.load_cell", "leave load_cell out"))
 
 
 def test_a_request_is_not_written_over(files: Path, tmp_path: Path, failing: Failing) -> None:
