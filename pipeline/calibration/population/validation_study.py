@@ -301,7 +301,8 @@ def _predictions(
 
 def within(at: Floats, curve: Floats) -> Floats:
     """Interpolates a curve (lines, 2) of displacement and force, NaN beyond its ends."""
-    return np.interp(at, *curve.T, left=np.nan, right=np.nan)
+    displacement, force = curve.T
+    return np.interp(at, displacement, force, left=np.nan, right=np.nan)
 
 
 def _mechanisms(ranked: Sequence[RankedMechanism]) -> dict[str, tuple]:
