@@ -73,7 +73,8 @@ dev: .venv/requirements-dev.lock
 	@test -e $@ || $(PYTHON) -m venv --clear .venv
 	@rm -f $@
 	@$(INSTALL) requirements.lock
-	@for each in $${CC:-cc} gcc clang; do command -v "$$each" >/dev/null && exit; done; \
+	@for each in "$${CC:-cc}" gcc clang; do \
+	    echo 'int one;' | $$each -x c -c -o /dev/null - 2>/dev/null && exit; done; \
 	    echo "No compiler of C is here: adding the one of requirements-compiler.lock" >&2; \
 	    $(INSTALL) requirements-compiler.lock
 	@cp requirements.lock $@

@@ -4,18 +4,16 @@ import argparse
 import importlib
 import pkgutil
 
-import sim
-from pipeline.runtime import PIXEL_LOOPS
+from pipeline.runtime import PIXEL_LOOPS, PREFIX
 from sim.core import LIBRARY, CLibrary
 
 
 def libraries() -> tuple[CLibrary, ...]:
     """Lists the libraries, with all that is declared in them."""
-    folders = sim.__path__
-    for module in pkgutil.walk_packages(folders, f"{sim.__name__}."):
+    for module in pkgutil.walk_packages([str(LIBRARY.folder)], f"{PREFIX}sim."):
         importlib.import_module(module.name)
     for name in _OVER_PIXELS:
-        importlib.import_module(name)
+        importlib.import_module(PREFIX + name)
     return LIBRARY, PIXEL_LOOPS
 
 

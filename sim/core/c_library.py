@@ -11,7 +11,7 @@ import inspect
 from collections.abc import Callable, Sequence
 from functools import cached_property, wraps
 from pathlib import Path
-from threading import Lock
+from threading import Lock, RLock
 from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -21,6 +21,8 @@ from sim.core import c_types, compiler
 F = TypeVar("F", bound=Callable[..., Any])
 
 HEADER = "declarations.h"
+_BINDING = RLock()
+"""Held while a function is bound: threads may call it for the first time at once."""
 
 
 class CLibrary:
@@ -108,6 +110,7 @@ class CFunction:
 
     def __init__(self, library: CLibrary, function: Callable[..., Any]) -> None:
         self._library, self._function = library, function
+        self._bound: Callable[..., Any] | None = None
 
     @property
     def module(self) -> str:
@@ -144,8 +147,15 @@ class CFunction:
         kind, _ = c_types.result(self.hints["return"])
         return f"{kind} {self.symbol}({', '.join(arguments)});"
 
-    @cached_property
+    @property
     def call(self) -> Callable[..., Any]:
+        """Returns the function in C, bound by the first thread that asks for it."""
+        if self._bound is None:
+            with _BINDING:
+                self._bound = self._bound or self._bind()
+        return self._bound
+
+    def _bind(self) -> Callable[..., Any]:
         """Binds the definition in C.
 
         Raises:

@@ -35,6 +35,8 @@ _FLAGS = (
     *("-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
 )
 
+_OF_LEVEL = ("-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mf16c", "-mlzcnt", "-mmovbe")
+"""The level, as compilers spell it that do not know its name (before gcc 11 and clang 12)."""
 _FULL = "No space left on device", "Disk quota exceeded"
 
 
@@ -79,28 +81,49 @@ def cache_folders() -> Iterator[Path]:
 
 def _load(folder: Path, library: Path, asked: list[str]) -> ctypes.CDLL:
     """Loads a library from its place, where it is compiled if it is not there or is damaged."""
-    if library.exists():
+    if _is_whole(library):
         with suppress(OSError):
             return ctypes.CDLL(str(library))
     with compile_time.counted(), library.with_suffix(".lock").open("w") as turn:
         with suppress(OSError):  # some file systems know no locks: then more than one compile it
             fcntl.flock(turn, fcntl.LOCK_EX)
-        if library.exists():  # another process has compiled it meanwhile
+        if _is_whole(library):  # another process has compiled it meanwhile
             with suppress(OSError):
                 return ctypes.CDLL(str(library))
         LOG.info("compiling %s, once on this machine: some seconds", folder.name)
-        with tempfile.TemporaryDirectory(dir=library.parent) as beside:
-            made = Path(beside) / library.name
-            _compile(folder, made, asked)
-            made.replace(library)
+        for left in library.parent.glob(f"{library.stem}_*"):  # by a process that was killed
+            shutil.rmtree(left, ignore_errors=True)
+        beside = Path(tempfile.mkdtemp(prefix=f"{library.stem}_", dir=library.parent))
+        try:
+            _keep(_compiled(folder, beside / library.name, asked), library)
+        finally:
+            shutil.rmtree(beside, ignore_errors=True)
     return ctypes.CDLL(str(library))
 
 
-def _compile(folder: Path, library: Path, asked: list[str]) -> None:
+def _is_whole(library: Path) -> bool:
+    """Tells whether a library is there with the size that was noted: loading part of one kills."""
+    try:
+        return library.stat().st_size == int(library.with_suffix(".size").read_bytes())
+    except (OSError, ValueError):
+        return False
+
+
+def _keep(made: Path, library: Path) -> None:
+    """Moves a library to its place once it is on the disk, and notes its size."""
+    with made.open("rb") as file:
+        os.fsync(file.fileno())
+    noted = made.with_suffix(".size")
+    noted.write_text(str(made.stat().st_size), encoding="ascii")
+    noted.replace(library.with_suffix(".size"))
+    made.replace(library)
+
+
+def _compiled(folder: Path, library: Path, asked: list[str]) -> Path:
     files = [str(path) for path in sources(folder) if path.suffix == ".c"]
     chosen = compiler()
-    if "ziglang" in chosen:  # which spells processors in its own way
-        asked = [each.replace(LEVEL, LEVEL.replace("-", "_")) for each in asked]
+    if "ziglang" in chosen and can_pin():  # which else compiles for the processor at hand
+        asked = [*asked, f"-march={LEVEL.replace('-', '_')}"]
     command = [*chosen, *asked, f"-I{folder.parent}", "-o", str(library), *files, "-lm"]
     try:
         ended = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -110,6 +133,7 @@ def _compile(folder: Path, library: Path, asked: list[str]) -> None:
         raise OSError(errno.ENOSPC, f"{library.parent} is full")
     if ended.returncode:
         raise CompilerError(f"{shlex.join(command)}\n{ended.stderr.strip()}")
+    return library
 
 
 def compiler() -> list[str]:
@@ -131,13 +155,17 @@ def compiler() -> list[str]:
 
 def options() -> list[str]:
     """Lists the compiler's options; those of METACLOAK_CFLAGS come last."""
-    level = [f"-march={LEVEL}"] if can_pin() else []
-    return [*_FLAGS, *level, *shlex.split(os.environ.get("METACLOAK_CFLAGS", ""))]
+    return [
+        *_FLAGS,
+        *(_OF_LEVEL if can_pin() else ()),
+        *shlex.split(os.environ.get("METACLOAK_CFLAGS", "")),
+    ]
 
 
 def _digest(folder: Path, asked: list[str]) -> str:
     """Hashes all that a library is made of."""
     made_for = (platform.system(), platform.machine(), *platform.libc_ver())
+    asked = [*asked, os.environ.get("CC", "")]
     digest = hashlib.sha256(" ".join([*asked, *made_for]).encode())
     for path in sources(folder):
         content = path.read_bytes()

@@ -1,15 +1,4 @@
-"""Compiles contact of units on their distance: energy, gradient, tangent, mixed derivatives.
-
-Derived by hand from sim/energy/distance_contact.py and tested against its automatic derivatives.
-Units are rigid,
-so each term is a function of where its vertex v lies in the frame of the other unit b: with g its
-gradient by v, r_a and r_b the arms of v from the two centroids, and J a quarter turn,
-
-    dE/d(u_a, theta_a, u_b, theta_b) = (g, J r_a . g, -g, -J r_b . g).
-
-The term of an edge is a function of the vertex's distance s outside its line and its position x
-along it; with t and n the edge's direction and outer normal g = E_s n + E_x t.
-"""
+"""Contact of units on their distance: energy, gradient, tangent, mixed derivatives."""
 
 from sim.collision import ContactArrays
 from sim.core import Floats, Ints, compiled

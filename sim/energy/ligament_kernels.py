@@ -1,18 +1,6 @@
-"""Compiles loops over the ligaments: energy, gradient, tangent and mixed derivatives.
+"""Loops over the ligaments: energy, gradient, tangent and mixed derivatives.
 
-Derived by hand from sim/energy/ligament.py and tested against its automatic derivatives. With d the
-current ligament vector, n and t its unit tangent and normal, L its length, gamma its shear angle,
-
-    dW/dd = k_l (L - l0) n + k_s l0^2 gamma t / L,
-    dW/dtheta = -k_s l0^2 gamma / 2 -+ k_theta kappa,
-
-each strain taken from its natural value (zero but where a ligament is not free of stress at rest),
-and the motions of the two units enter through
-
-    d = vector + (u_b + R_b r_b - r_b) - (u_a + R_a r_a - r_a).
-
-Second derivatives read the kinematics that ``gradient`` or ``locate`` left of the same state: sines
-and arctangents are two thirds of their cost.
+Second derivatives read the kinematics that ``gradient`` or ``locate`` left of the same state.
 """
 
 from sim.core import Floats, Ints, compiled

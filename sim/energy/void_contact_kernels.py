@@ -1,10 +1,4 @@
-"""Compiles contact on the angle of the voids: energy, gradient, tangent, mixed derivatives.
-
-Derived by hand from sim/energy/ligament.py and tested against its automatic derivatives. Units are
-rigid, so
-the two voids beside a ligament open and close with the rotation of its first unit against its
-second, the "turn".
-"""
+"""Contact on the angle of the voids: energy, gradient, tangent, mixed derivatives."""
 
 from sim.core import Floats, Ints, compiled
 from sim.energy.network_arrays import NetworkArrays, Sensitivity

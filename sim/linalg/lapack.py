@@ -21,7 +21,8 @@ def hand_over(library: ctypes.CDLL) -> None:
     """Fills the pointers of ``lapack.c``."""
     for module, names in _ROUTINES.items():
         for name in names:
-            ctypes.c_void_p.in_dll(library, name).value = _address(module.__pyx_capi__[name])
+            pointer = ctypes.c_void_p.in_dll(library, f"lapack_{name}")
+            pointer.value = _address(module.__pyx_capi__[name])
 
 
 def _address(capsule: object) -> int:

@@ -46,12 +46,12 @@ bool multifrontal_factorise(double *values, double *scratch, const Fronts *f) {
         for (int64_t c = f->child[front]; c < f->child[front + 1]; c++)
             add_child(f->children[c], k, b, panel, block, scratch, f);
         int own = k, rest = b, whole = k + b, info = 0;
-        dpotrf("L", &own, panel, &whole, &info);
+        lapack_dpotrf("L", &own, panel, &whole, &info);
         if (info != 0 || !isfinite(panel[(k - 1) * (k + b) + k - 1])) return false;
         if (b == 0) continue;
         double *below = panel + k;
-        dtrsm("R", "L", "T", "N", &rest, &own, &plus, panel, &whole, below, &whole);
-        dsyrk("L", "N", &rest, &own, &minus, below, &whole, &plus, block, &rest);
+        lapack_dtrsm("R", "L", "T", "N", &rest, &own, &plus, panel, &whole, below, &whole);
+        lapack_dsyrk("L", "N", &rest, &own, &minus, below, &whole, &plus, block, &rest);
     }
     return true;
 }
@@ -67,15 +67,15 @@ void multifrontal_solve(const double *values, const Fronts *f, int64_t n, double
         int rest = f->edge[front + 1] - f->edge[front], own = end - first, whole = own + rest;
         double *panel = (double *)values + f->panel[front], *below = panel + own, *x = right + first;
         if (down) {
-            dtrsv("L", "N", "N", &own, panel, &whole, x, &unit);
+            lapack_dtrsv("L", "N", "N", &own, panel, &whole, x, &unit);
             if (rest)
-                dgemv("N", &rest, &own, &plus, below, &whole, x, &unit, &none, gathered, &unit);
+                lapack_dgemv("N", &rest, &own, &plus, below, &whole, x, &unit, &none, gathered, &unit);
             for (int i = 0; i < rest; i++) right[rows[i]] -= gathered[i];
         } else {
             for (int i = 0; i < rest; i++) gathered[i] = right[rows[i]];
             if (rest)
-                dgemv("T", &rest, &own, &minus, below, &whole, gathered, &unit, &plus, x, &unit);
-            dtrsv("L", "T", "N", &own, panel, &whole, x, &unit);
+                lapack_dgemv("T", &rest, &own, &minus, below, &whole, gathered, &unit, &plus, x, &unit);
+            lapack_dtrsv("L", "T", "N", &own, panel, &whole, x, &unit);
         }
     }
     free(gathered);

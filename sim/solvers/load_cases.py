@@ -110,7 +110,6 @@ def solve_cases(
 
 def adjoint_cases(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats) -> Gradients:
     """Sweeps back through ``solve_cases``, from loss derivatives shaped as its outputs."""
-    # copies, as jax's arrays are read only: loops would be compiled once more for these
     flat_u, flat_v = (with_loads(solver.topology, bar) for bar in (bar_u, bar_v))
     results = _spread(
         lambda case: _sweep_back(

@@ -88,13 +88,32 @@ def test_code_that_others_may_have_written_is_not_run(tmp_path: Path) -> None:
     assert not list(own.rglob("*.so"))
 
 
-def test_a_damaged_file_is_compiled_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("share", [0.01, 0.5])
+def test_a_damaged_file_is_compiled_again(tmp_path: Path, share: float) -> None:
     folder, cache = loops(tmp_path), tmp_path / "cache"
     told(folder, cache)
     (library,) = cache.rglob("*.so")
-    library.write_bytes(library.read_bytes()[:100])
+    whole = library.read_bytes()
+    library.write_bytes(whole[: int(share * len(whole))])
     assert told(folder, cache) == ("14", True)
     assert told(folder, cache) == ("14", False)
+
+
+def test_what_a_killed_process_leaves_is_removed(tmp_path: Path) -> None:
+    folder, cache = loops(tmp_path), tmp_path / "cache"
+    told(folder, cache)
+    (library,) = cache.rglob("*.so")
+    left = library.with_name(f"{library.stem}_left")
+    left.mkdir()
+    library.unlink()
+    assert told(folder, cache) == ("14", True)
+    assert not left.exists()
+
+
+def test_another_compiler_compiles_anew(tmp_path: Path) -> None:
+    folder, cache = loops(tmp_path), tmp_path / "cache"
+    assert told(folder, cache, CC="gcc") == ("14", True)
+    assert told(folder, cache, CC="cc") == ("14", True)
 
 
 def test_without_a_compiler_the_remedy_is_told(
