@@ -150,9 +150,9 @@ class CFunction:
     @property
     def call(self) -> Callable[..., Any]:
         """Returns the function in C, bound by the first thread that asks for it."""
-        if self._bound is None:
-            with _BINDING:
-                self._bound = self._bound or self._bind()
+        with _BINDING:
+            if self._bound is None:
+                self._bound = self._bind()
         return self._bound
 
     def _bind(self) -> Callable[..., Any]:

@@ -215,7 +215,7 @@ def _hiding_the_drive(film: xr.Dataset) -> xr.Dataset:
     [
         (lambda film: film.isel(unit=slice(1, None)), "", "not of this study's design: it has 24"),
         (lambda film: film, "structure: intact\n", "other units are absent"),
-        (lambda film: film.assign(vertices=film["vertices"] + 0.7), "", "up to 0.70 mm from"),
+        (lambda film: film.assign(vertices=film["vertices"] + 0.7), "", "up to 0.70 mm apart"),
         (lambda film: film.isel(time=slice(0, 6)), "", "too few frames"),
         (_hiding_the_drive, "", "no driven unit is seen"),
         (lambda film: film.assign(displacement=-film["displacement"]), "", "cannot be aligned"),
