@@ -1,4 +1,4 @@
-"""Compiles loops over pixels, and names the type of a picture."""
+"""Names the library of loops over pixels, and the type of a picture."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ Picture = Image | Singles
 """Brightness from 0 to 255, in steps of one or finer."""
 
 _SUMS = ("-fassociative-math", "-fno-signed-zeros", "-freciprocal-math", "-ffp-contract=fast")
-"""What the compiler may do to sums, which are the same on every run; NaN stays NaN."""
+"""Lets the compiler reorder sums, which are the same on every run; NaN stays NaN."""
 
 PIXEL_LOOPS = CLibrary(Path(__file__).resolve().parents[1], _SUMS)
 compiled = PIXEL_LOOPS.compiled

@@ -4,7 +4,7 @@
    its running sum along the rows is the picture. It is linear, so polygons that lie within others
    carry the difference of their shades, and all go into one buffer. */
 #include "pipeline/declarations.h"
-#include "pipeline/runtime/numbers.h"
+#include "sim/core/numbers.h"
 
 #include <math.h>
 

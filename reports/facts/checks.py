@@ -25,8 +25,8 @@ _told = facts_of(__file__)
 def history_facts(problem: Problem, design: xr.Dataset) -> Iterator[Fact]:
     """Yields evaluations, best feasible loss and optimality of every method, and of descents."""
     before, unit = angle_budget(problem), design["best_loss"].attrs["units"]
-    if problem.optimiser.angle is not None:
-        yield from _first_fact(problem, problem.optimiser.angle.evaluations)
+    if before:
+        yield _first_fact(problem, before)
     for method in design["method"].values:
         history, of = design.sel({"method": method}), {"method": method, "name": method.upper()}
         count, best = evaluation_count(history), float(history["best_loss"])
@@ -79,14 +79,11 @@ def shipping(problem: Problem, design: xr.Dataset, method: str) -> str:
     )
 
 
-def _first_fact(problem: Problem, evaluations: int) -> Iterator[Fact]:
+def _first_fact(problem: Problem, evaluations: int) -> Fact:
     """Tells the budget of SQP by the angle law, from whose design it alone goes on."""
-    optimiser = problem.optimiser
-    methods = optimiser.methods.chosen
-    if "sqp" in methods and problem.contact.law == "geometric":
-        each = ", in each descent" if optimiser.descents > 1 else ""
-        other = "; MMA does without" if "mma" in methods else ""
-        yield _told("evaluations_angle", evaluations, each=each, other=other)
+    each = ", in each descent" if problem.optimiser.descents > 1 else ""
+    other = "; MMA does without" if "mma" in problem.optimiser.methods.chosen else ""
+    return _told("evaluations_angle", evaluations, each=each, other=other)
 
 
 def error_facts(response: xr.Dataset, note: str) -> Iterator[Fact]:

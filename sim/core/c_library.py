@@ -19,6 +19,7 @@ import numpy as np
 from sim.core import c_types, compiler
 
 F = TypeVar("F", bound=Callable[..., Any])
+Preparation = Callable[[ctypes.CDLL], None]
 
 HEADER = "declarations.h"
 _BINDING = RLock()
@@ -36,7 +37,7 @@ class CLibrary:
     def __init__(self, folder: Path, flags: Sequence[str] = ()) -> None:
         self.folder, self.flags = folder, tuple(flags)
         self.functions: list[CFunction] = []
-        self._prepare: list[Callable[[ctypes.CDLL], None]] = []
+        self._prepare: list[Preparation] = []
         self._lock = Lock()
 
     def compiled(self, function: F) -> F:
@@ -50,9 +51,10 @@ class CLibrary:
 
         return cast(F, call)
 
-    def prepared(self, prepare: Callable[[ctypes.CDLL], None]) -> None:
+    def prepared(self, prepare: Preparation) -> Preparation:
         """Has the library prepared by a function as soon as it is loaded."""
         self._prepare.append(prepare)
+        return prepare
 
     @property
     def code(self) -> ctypes.CDLL:

@@ -37,6 +37,8 @@ _FLAGS = (
 
 _OF_LEVEL = ("-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mf16c", "-mlzcnt", "-mmovbe")
 """The level, as compilers spell it that do not know its name (before gcc 11 and clang 12)."""
+_SHARED = Path(__file__).parent
+"""Holds the headers that any library may include, as `sim/core/numbers.h`."""
 _FULL = "No space left on device", "Disk quota exceeded"
 
 
@@ -167,7 +169,7 @@ def _digest(folder: Path, asked: list[str]) -> str:
     made_for = (platform.system(), platform.machine(), *platform.libc_ver())
     asked = [*asked, os.environ.get("CC", "")]
     digest = hashlib.sha256(" ".join([*asked, *made_for]).encode())
-    for path in sources(folder):
+    for path in [*sources(folder), *sorted(_SHARED.glob("*.h"))]:
         content = path.read_bytes()
-        digest.update(f"{path.relative_to(folder)} {len(content)}\n".encode() + content)
+        digest.update(f"{path.name} {len(content)}\n".encode() + content)
     return digest.hexdigest()[:16]

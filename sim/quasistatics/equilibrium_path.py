@@ -33,13 +33,13 @@ def follow(
 ) -> tuple[int, float]:  # fmt: skip
     """Fills a branch with the equilibria at ``loads`` (n_loads, n_held), the first `known` kept.
 
-    `pace` (4,), see ``INCREMENT``, is that with which these were found. `bends` (n_loads, n_dofs)
-    is by how much the path of a similar structure departs from its tangent between two loads, to be
-    tried first where `trusted` (n_loads,). Where the path ends, the structure `leaves` it, or the
-    branch ends as well. The critical mode of a branching is followed in the `sense` 1 or -1. `work`
-    is room for the states. The residual's tolerance is relative to the largest reaction, its floor
-    `absolute` in N; `drag` (n_dofs,) is that of the damped motion after a snap; `counts` (4,)
-    gathers the work.
+    `pace` (4,), see ``quasistatics.h``, is that with which these were found. `bends` (n_loads,
+    n_dofs) is by how much the path of a similar structure departs from its tangent between two
+    loads, to be tried first where `trusted` (n_loads,). Where the path ends, the structure `leaves`
+    it, or the branch ends as well. The critical mode of a branching is followed in the `sense` 1 or
+    -1. `work` is room for the states. The residual's tolerance is relative to the largest reaction,
+    its floor `absolute` in N; `drag` (n_dofs,) is that of the damped motion after a snap; `counts`
+    (4,) gathers the work.
 
     Returns:
         the number of loads reached, and the fraction of the way to the next.

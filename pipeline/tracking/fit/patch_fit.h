@@ -3,7 +3,7 @@
 #define PIPELINE_PATCH_FIT_H
 
 #include "pipeline/declarations.h"
-#include "pipeline/runtime/numbers.h"
+#include "sim/core/numbers.h"
 
 /* Codecs quantise blocks of 8 x 8 pixels. Processors add 8 numbers at once: the pixels of a block
    that are compared are filled up to a multiple of LANES, and arrays begin at a multiple of ALIGNED

@@ -1,4 +1,4 @@
-"""Where units rest: as their outlines tell, and where these do not, as the design has them."""
+"""Place units at rest as their outlines tell, and where these do not, as the design has them."""
 
 from dataclasses import replace
 

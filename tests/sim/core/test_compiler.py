@@ -1,4 +1,4 @@
-"""What is in C is compiled once on a machine, and anew after any edit of it."""
+"""Compile what is in C once on a machine, and anew after any edit of it."""
 
 import os
 import shutil
