@@ -23,8 +23,6 @@ OF_EQUILIBRIA: tuple[Storage, ...] = ("band", "fronts")
 equilibria are pinned to the last bit, and each way to solve rounds in its own way."""
 OF_MOTIONS: tuple[Storage, ...] = ("panels", "fronts")
 
-NARROW = 100
-"""Columns of a band up to which a factorisation of our own beats LAPACK's, as in ``banded.c``."""
 BY_FRONTS, BY_PANELS = -1, -2
 
 
@@ -97,7 +95,7 @@ def seconds(pattern: Pattern) -> float:
     """Predicts the time of one core to factorise a matrix of that pattern, s."""
     if pattern.storage == "band":
         n, width = (float(number) for number in pattern.size)
-        return (NARROW_FLOP if width < NARROW else BAND_FLOP) * n * width**2
+        return (NARROW_FLOP if width < band.NARROW else BAND_FLOP) * n * width**2
     if pattern.storage == "panels":
         return float(PANEL_FLOP * (np.diff(pattern.panels.first).astype(float) ** 2 / 4).sum())
     own, edge = (

@@ -17,7 +17,7 @@ static const double SMALLEST_INCREMENT = 1e-8;
 
 /* Places in the counts that the solvers gather, as in newton.py. */
 enum { GRADIENTS, FACTORS, SHIFTED, INCREMENTS };
-/* Places in the pace of a path, as in increments.py. */
+/* Places in the pace of a path: the increment, the lowest eigenvalue and its rate, the first one. */
 enum { INCREMENT, VALUE, RATE, FIRST };
 /* How a way went on, as in path_ends.py. */
 enum { SMOOTH, LIMIT_POINT, BRANCHING };
