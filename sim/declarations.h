@@ -249,13 +249,14 @@ bool esdirk_adjoint_adjoint(double *times, double *stage_u, double *stage_v, dou
 void esdirk_march(double *times, int64_t first, double *drive, const System *system, const Workspace *work, double *stages, double *nodes, double tolerance, double *u, double *v, double *a, int64_t *counts, int64_t n_times, int64_t n_nodes, double *returned);
 double ligament_kernels_gradient(double *motion, const NetworkArrays *net, const Kinematics *kinematics, double *out);
 void ligament_kernels_hessian_product(double *motion, const NetworkArrays *net, const Kinematics *kinematics, double *direction, double *out);
+void ligament_kernels_largest_strains(double *motion, const NetworkArrays *net, const Kinematics *kinematics, double *out);
 void ligament_kernels_locate(double *motion, const NetworkArrays *net, const Kinematics *kinematics);
 void ligament_kernels_mixed(double *motion, const NetworkArrays *net, const Kinematics *kinematics, double *direction, int64_t *which, const Sensitivity *out, int64_t n_which);
 void ligament_kernels_tangent(double *motion, const NetworkArrays *net, const Kinematics *kinematics, int64_t *entries, double *values);
 int64_t neighbour_list_find(double *motion, const ContactArrays *contacts);
 int64_t neighbour_list_pairs_in_contact(double *motion, const ContactArrays *contacts);
 bool newton_factorise_tangent(double *motion, const System *system, const Workspace *work, double shift, int64_t *counts);
-void observables_visit(double *states, const System *system, const Kinematics *kinematics, double *energies, double *forces, int64_t *pairs, int64_t n_states);
+void observables_visit(double *states, const System *system, const Kinematics *kinematics, double *energies, double *forces, double *strains, int64_t *pairs, int64_t n_states);
 bool snap_relax(double *motion, double *drag, double relative, double absolute, const System *system, const Workspace *work, int64_t *counts);
 double step_limit_collision_free_step(double *motion, const ContactArrays *contacts, double *step);
 void symmetric_add(const Matrix *of, int64_t i, int64_t j, double value);

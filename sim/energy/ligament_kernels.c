@@ -11,6 +11,7 @@
    rest), and the motions of the two units enter through
 
        d = vector + (u_b + R_b r_b - r_b) - (u_a + R_a r_a - r_a). */
+#include "sim/core/numbers.h"
 #include "sim/declarations.h"
 
 #include <math.h>
@@ -105,6 +106,19 @@ void ligament_kernels_locate(
     for (int64_t k = 0; k < net->n_unit; k++) {
         Rotated r = rotated(motion, kinematics->turn, net, k);
         kinematics->shear[k] = shear_of(kinematics->turn, net, k, r.dx, r.dy);
+    }
+}
+
+void ligament_kernels_largest_strains(
+    double *motion, const NetworkArrays *net, const Kinematics *kinematics, double *out) {
+    out[0] = out[1] = out[2] = 0.0;
+    EACH(k, net->n_unit) {
+        const double *natural = net->natural + 3 * k;
+        Rotated r = rotated(motion, kinematics->turn, net, k);
+        Lengths l = lengths(motion, net, k, r.dx, r.dy);
+        double strain[3] = {
+            (l.stretch + natural[0]) / l.rest, kinematics->shear[k] + natural[1], l.bend + natural[2]};
+        EACH(m, 3) out[m] = isnan(strain[m]) ? strain[m] : most(out[m], fabs(strain[m]));
     }
 }
 

@@ -22,6 +22,16 @@ def gradient(motion: Floats, net: NetworkArrays, kinematics: Kinematics, out: Fl
 
 
 @compiled
+def largest_strains(
+    motion: Floats, net: NetworkArrays, kinematics: Kinematics, out: Floats
+) -> None:
+    """Fills ``out`` (3,) with the largest magnitudes of `LigamentStrain`, stretches over lengths.
+
+    All are zero without ligaments, and no numbers where the motion is none.
+    """
+
+
+@compiled
 def tangent(
     motion: Floats, net: NetworkArrays, kinematics: Kinematics, entries: Ints, values: Floats
 ) -> None:

@@ -2,21 +2,14 @@
 
 from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, NewContactPairs, compiled
 from sim.energy.connectivity import Topology
-from sim.energy.ligament import LigamentStrain, ligament_strain
 from sim.energy.network_arrays import Kinematics
 from sim.energy.system import System, kinematics_of, system_of
 from sim.structure import ConcreteParameters, VoidAngleContact
-
-BLOCK = 64
-"""States whose strains are computed at once."""
 
 
 class Observables(NamedTuple):
@@ -50,9 +43,9 @@ class Observables(NamedTuple):
 @compiled
 def _visit(
     states: Floats, system: System, kinematics: Kinematics, energies: Floats, forces: Floats,
-    pairs: Ints, n_states: int = 0,
+    strains: Floats, pairs: Ints, n_states: int = 0,
 ) -> None:  # fmt: skip
-    """Fills the energies (n_states, 2) of states, their gradients, and pairs in contact."""
+    """Fills energies (n_states, 2), gradients, largest strains (n_states, 3), pairs in contact."""
 
 
 def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> Observables:
@@ -60,9 +53,10 @@ def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> O
     topology = topology.unloaded
     states = np.ascontiguousarray(motion.reshape(len(motion), topology.n_dofs))
     energies, forces = np.empty((len(states), 2)), np.empty_like(states)
+    strains = np.empty((len(states), 3))
     near = np.zeros(len(states), dtype=np.int64)
     system = system_of(topology, values)
-    _visit(states, system, kinematics_of(system), energies, forces, near)
+    _visit(states, system, kinematics_of(system), energies, forces, strains, near)
     try:
         raise_new_pairs(system.contacts)
     except NewContactPairs as met:
@@ -70,47 +64,11 @@ def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> O
     reaction = np.full_like(states, np.nan)
     reaction[:, topology.held] = forces[:, topology.held]
     law, voids = topology.contact, topology.smallest_void_angles(values.void, motion)
-    strain = _largest_strains(topology.ligament_units, values, motion)
     return Observables(
         energies[:, 0],
         energies[:, 1],
         reaction.reshape(motion.shape),
         voids.min(axis=1, initial=np.pi),
         (voids < law.cutoff_angle).sum(axis=1) if isinstance(law, VoidAngleContact) else near,
-        *strain,
+        *strains.T,
     )
-
-
-def _largest_strains(
-    ligament_units: Ints, values: ConcreteParameters, motion: Floats
-) -> tuple[Floats, ...]:
-    """Computes the largest strains (n_states,) of `LigamentStrain`, a block of states at a time.
-
-    So they are compiled for a structure, not for each number of its states.
-    """
-    found = np.empty((len(LigamentStrain._fields), len(motion)))
-    arm, vector = jnp.asarray(values.arm), jnp.asarray(values.vector)
-    for first in range(0, len(motion), BLOCK):
-        block = motion[first : first + BLOCK]
-        padded = np.zeros((BLOCK, *motion.shape[1:]))
-        padded[: len(block)] = block
-        strains = _strains_of_block(ligament_units, arm, vector, padded)
-        found[:, first : first + BLOCK] = np.stack(strains)[:, : len(block)]
-    return tuple(found)
-
-
-@jax.jit
-def _strains_of_block(
-    ligament_units: Ints, arm: Array, vector: Array, motion: Array
-) -> LigamentStrain:
-    """Largest magnitudes (n_states,) over the ligaments; the stretch relative to the length."""
-    of_all = jax.vmap(ligament_strain)
-    length = jnp.linalg.norm(vector, axis=1)
-
-    def of_state(state: Array) -> LigamentStrain:
-        ends = state[ligament_units]
-        found = of_all(ends[:, 0], ends[:, 1], arm[:, 0], arm[:, 1], vector)
-        relative = found._replace(stretch=found.stretch / length)
-        return LigamentStrain(*(jnp.abs(part).max(initial=0.0) for part in relative))
-
-    return jax.lax.map(of_state, motion)

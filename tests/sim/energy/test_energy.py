@@ -1,6 +1,5 @@
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -17,12 +16,12 @@ from sim.energy import (
     contact_energy,
     ligament_energy,
     ligament_kernels,
-    observables,
     topology,
     void_contact_kernels,
 )
+from sim.energy.ligament import ligament_strain
 from sim.energy.network_arrays import Kinematics, NetworkArrays
-from sim.energy.observables import BLOCK, observe
+from sim.energy.observables import observe
 from sim.scene import concrete_parameters
 from sim.structure import Lattice, VoidAngleContact, shape
 from tests.sim.reference_scenes import compressed, reference
@@ -161,17 +160,33 @@ def test_observables_are_those_of_each_state() -> None:
     assert np.isnan(seen.reaction[:, 1:]).all()
 
 
-@pytest.mark.parametrize("n_states", [1, BLOCK, BLOCK + 1])
-def test_a_state_is_observed_the_same_among_any_number(n_states: int) -> None:
-    """And no other number of them compiles anything anew."""
+def test_a_state_is_observed_the_same_among_others() -> None:
     lattice = rotating_squares()
     top = topology(lattice, NONE, VoidAngleContact(BARRIER, CUTOFF))
-    motion = np.random.default_rng(2).normal(0.0, 0.05, (n_states, lattice.n_units, 3))
+    motion = np.random.default_rng(2).normal(0.0, 0.05, (5, lattice.n_units, 3))
     found = observe(top, at_rest(lattice), motion)
     alone = observe(top, at_rest(lattice), motion[-1:])
     for all_states, last in zip(found, alone, strict=True):
         np.testing.assert_array_equal(np.asarray(all_states)[-1:], last)
-    strains: Any = observables._strains_of_block
-    compiled = strains._cache_size()
-    observe(top, at_rest(lattice), np.zeros((n_states + 3, lattice.n_units, 3)))
-    assert strains._cache_size() == compiled
+
+
+def test_largest_strains_are_those_of_the_law() -> None:
+    """Of ligaments that are not free of stress at rest too; and of a state that is none, none."""
+    lattice = rotating_squares()
+    top = topology(lattice, NONE, VoidAngleContact(BARRIER, CUTOFF))
+    motion = np.random.default_rng(3).normal(0.0, 0.05, (3, lattice.n_units, 3))
+    natural = np.random.default_rng(4).normal(0.0, 0.1, (len(top.ligament_units), 3))
+    values = at_rest(lattice)._replace(natural=natural)
+    strains = jax.vmap(ligament_strain)
+    seen = observe(top, values, motion)
+    for n, state in enumerate(motion):
+        ends = state[top.ligament_units]
+        ligaments = values.arm[:, 0], values.arm[:, 1], values.vector
+        stretch, shear, bend = strains(ends[:, 0], ends[:, 1], *map(jnp.asarray, ligaments))
+        length = np.linalg.norm(values.vector, axis=1)
+        for found, each in zip(
+            (seen.stretch, seen.shear, seen.bend), (stretch / length, shear, bend), strict=True
+        ):
+            assert found[n] == pytest.approx(float(np.abs(each).max()), rel=1e-12)
+    unknown = observe(top, values, np.full_like(motion, np.nan))
+    assert np.isnan([unknown.stretch, unknown.shear, unknown.bend]).all()
