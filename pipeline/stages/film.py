@@ -98,6 +98,10 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     with write_atomically(described) as aside:
         text = recordings.recording_yaml(_described(asked, virtual, out, design), comments)
         aside.write_text(text, encoding="utf-8")
+    log = out.with_name(f"{out.stem}_load.csv")
+    if virtual.load_cell is not None and not log.exists():
+        words = "`python -m pipeline film weigh` writes the log of its load cell, %s"
+        LOG.info(words, log)
 
 
 def _weigh(path: Path, response: Path, out: Path) -> None:

@@ -22,7 +22,7 @@ from sim.solvers import Harmonic
 from tests.tables import some
 
 COMPILED = ("compilation", "fresh factors")
-"""Those that compile every loop anew, minutes each: tests/slow/test_benchmarks.py tries them."""
+"""Those that compile every loop anew, seconds each: tests/slow/test_benchmarks.py tries them."""
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ class Prediction(Section):
     """The spread of the simulation that a measured course is compared with.
 
     A size that is not given is the smallest that `robustness` tries of its kind, where it tries
-    some, and else the usual one of `Tolerances`.
+    some, and else the default of `virtual.specimen`.
 
     Attributes:
         samples: specimens drawn.
