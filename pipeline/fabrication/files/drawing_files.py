@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from pipeline.fabrication.parts import FlatPart
 from pipeline.fabrication.plates import LaserSheet
 from sim.core import Floats
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
-    from ezdxf.layouts.layout import Modelspace
 
 APPLICATION = "METACLOAK"
 """All curves of a part carry its id as extended data under this name."""
@@ -32,29 +30,22 @@ LAYER_COLOURS = {
 }
 """Layers in the order in which they are drawn and cut, with the colours of their lines."""
 
+_ENTITIES = "  2\nENTITIES\n"  # begins the section of a DXF that holds the curves
 _HAIRLINE = 0.0762  # mm, 0.003 in: what cutters take for a cut
 
 
 def write_dxf(sheet: LaserSheet, path: Path, version: Literal["R2010", "R12"] = "R2010") -> None:
     """Writes a sheet; inner cuts come before the outer one of the same part."""
-    document = _new_document(version)
-    space = document.modelspace()
-    width, height = sheet.size
-    low, high = (0.0, 0.0, 0.0), (width, height, 0.0)
-    document.header["$EXTMIN"], document.header["$EXTMAX"] = low, high
-    # or ezdxf writes those of the layout over them, unless the lower one is the origin
-    space.reset_extents(low, high)
-    rim = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
-    _add_line(space, rim, "REFERENCE", closed=True)
-    for part in sheet.parts:
-        for entity in _add_part(space, part):
-            entity.set_xdata(APPLICATION, [(1000, part.id)])
+    document = new_document(version, sheet.size)
+    records = "".join(_records(sheet, _CurveRecords(document)))
     stream = io.StringIO()
     document.write(stream)
-    path.write_text(stream.getvalue(), encoding="utf-8", newline="\n")
+    text = stream.getvalue().replace(_ENTITIES, _ENTITIES + records, 1)
+    path.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _new_document(version: str) -> Drawing:
+def new_document(version: str, size: tuple[float, float]) -> Drawing:
+    """Makes a document with the layers of a sheet of this size, mm, and nothing drawn."""
     from ezdxf._options import options
     from ezdxf.filemanagement import new
 
@@ -67,28 +58,85 @@ def _new_document(version: str) -> Drawing:
     document.appids.add(APPLICATION)
     for name, colour in LAYERS.items():
         document.layers.add(name, color=colour, plot=name != "REFERENCE")  # told by R2010 alone
+    low, high = (0.0, 0.0, 0.0), (*size, 0.0)
+    document.header["$EXTMIN"], document.header["$EXTMAX"] = low, high
+    # or ezdxf writes those of the layout over them, unless the lower one is the origin
+    document.modelspace().reset_extents(low, high)
     return document
 
 
-def _add_part(space: Modelspace, part: FlatPart) -> Iterator[Any]:
-    for stroke in part.engraving:
-        yield _add_line(space, stroke, "ENGRAVE")
-    for stroke in part.scores:
-        yield _add_line(space, stroke, "SCORE")
-    for hole in part.holes:
-        yield space.add_circle(hole.centre, hole.diameter / 2, dxfattribs={"layer": "CUT_INNER"})
-    for cut in part.cuts:
-        whole = not part.tabs
-        yield _add_line(space, cut[:-1] if whole else cut, "CUT_OUTER", closed=whole)
+def _records(sheet: LaserSheet, drawn: _CurveRecords) -> Iterator[str]:
+    width, height = sheet.size
+    rim = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
+    yield drawn.line(_distinct(np.array(rim)), "REFERENCE", closed=True)
+    for part in sheet.parts:
+        for stroke in part.engraving:
+            yield drawn.line(_distinct(stroke), "ENGRAVE", part.id)
+        for stroke in part.scores:
+            yield drawn.line(_distinct(stroke), "SCORE", part.id)
+        for hole in part.holes:
+            yield drawn.circle(hole.centre, hole.diameter / 2, "CUT_INNER", part.id)
+        for cut in part.cuts:
+            whole = not part.tabs
+            points = _distinct(cut[:-1] if whole else cut)
+            yield drawn.line(points, "CUT_OUTER", part.id, closed=whole)
 
 
-def _add_line(space: Modelspace, points: Floats, layer: str, *, closed: bool = False) -> Any:  # noqa: ANN401
-    """Adds points rounded to 1e-6 mm, without repetitions of the one before, as a polyline."""
+def _distinct(points: Floats) -> list[list[float]]:
+    """Lists points rounded to 1e-6 mm, without repetitions of the one before."""
     rounded = np.round(points, 6)
-    distinct = np.append(True, (np.diff(rounded, axis=0) != 0.0).any(axis=1))
-    old = space.doc.dxfversion == "AC1009"
-    add = space.add_polyline2d if old else space.add_lwpolyline
-    return add(rounded[distinct].tolist(), close=closed, dxfattribs={"layer": layer})
+    kept = np.append(True, (np.diff(rounded, axis=0) != 0.0).any(axis=1))
+    return list(rounded[kept].tolist())
+
+
+class _CurveRecords(NamedTuple):
+    """Formats curves of one document as its records, byte for byte as ezdxf writes its entities.
+
+    An entity for each vertex of an R12 would take ten times as long as all the rest of a sheet.
+    Curves take the next free handles of the document.
+    """
+
+    document: Drawing  # R2010 or R12
+
+    def line(
+        self, points: Sequence[Sequence[float]], layer: str, part: str = "", *, closed: bool = False
+    ) -> str:
+        """Formats a polyline through points (x, y), mm, of a part or of none."""
+        if not self._is_old:
+            vertices = "".join(f" 10\n{x}\n 20\n{y}\n" for x, y in points)
+            head = f"{self._head('LWPOLYLINE', layer)}100\nAcDbPolyline\n"
+            return f"{head} 90\n{len(points)}\n 70\n{closed:d}\n{vertices}{_owner(part)}"
+        head, end = self._head("POLYLINE", layer), self._head("SEQEND", layer)
+        vertices = "".join(
+            f"{self._head('VERTEX', layer)} 10\n{x}\n 20\n{y}\n 30\n0.0\n 70\n0\n"
+            for x, y in points
+        )
+        start = f" 66\n1\n 10\n0.0\n 20\n0.0\n 30\n0.0\n 70\n{closed:d}\n"
+        return f"{head}{start}{_owner(part)}{vertices}{end}"
+
+    def circle(self, centre: Sequence[float], radius: float, layer: str, part: str) -> str:
+        """Formats a circle of a part, mm."""
+        x, y = centre
+        kind = "" if self._is_old else "100\nAcDbCircle\n"
+        place = f" 10\n{x}\n 20\n{y}\n 30\n0.0\n 40\n{radius}\n"
+        return f"{self._head('CIRCLE', layer)}{kind}{place}{_owner(part)}"
+
+    @property
+    def _is_old(self) -> bool:
+        return bool(self.document.dxfversion == "AC1009")
+
+    def _head(self, kind: str, layer: str) -> str:
+        """Begins a record with its kind, its handle and its layer."""
+        head = f"  0\n{kind}\n  5\n{self.document.entitydb.next_handle()}\n"
+        if self._is_old:
+            return f"{head}  8\n{layer}\n"
+        space = self.document.modelspace().layout_key
+        return f"{head}330\n{space}\n100\nAcDbEntity\n  8\n{layer}\n"
+
+
+def _owner(part: str) -> str:
+    """Names the part of a curve in its extended data."""
+    return f"1001\n{APPLICATION}\n1000\n{part}\n" if part else ""
 
 
 def write_svg(sheet: LaserSheet, path: Path) -> None:

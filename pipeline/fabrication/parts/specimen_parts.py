@@ -79,7 +79,7 @@ class FlatPart:
     tabs: tuple[Circle, ...] = ()  # where the outline is not cut, so that its sheet holds the part
     slot: float = np.inf  # width of its narrowest slot
 
-    @property
+    @cached_property
     def cuts(self) -> list[Floats]:
         """Outer cuts, polylines (n, 2) from tab to tab; without tabs the closed outline."""
         ring = self.outline.exterior
