@@ -206,9 +206,11 @@ def _check_letters(drawing: Drawing) -> Iterator[Fault]:
             continue
         if not area.covers(written):
             yield drawing.fault("engraving beyond its outline", part, shown, key, remedy)
-        pieces = shapely.get_parts(shapely.unary_union(written.buffer(_JOINED)))
+        if units:
+            continue
+        pieces = shapely.get_parts(written.buffer(_JOINED))
         height = max(rectangle_sides(piece)[1] for piece in pieces) - 2 * _JOINED
-        if height < _LEAST_LETTER - TOLERANCE and not units:
+        if height < _LEAST_LETTER - TOLERANCE:
             what = f"letters of {height:.2f} mm, less than {_LEAST_LETTER:g} mm"
             yield drawing.fault(what, part, shown, key, "give larger letters")
 
@@ -263,11 +265,12 @@ def _is_offset(cut: Geometry, nominal: Geometry, shift: float, way: Floats) -> b
     Their part lies `way` (2,) from the nominal one; without a number, each cut for itself is laid
     on the nominal one.
     """
-    sharp = nominal.buffer(shift, join_style="mitre", mitre_limit=MITRE)
+    if np.isnan(way).any():
+        sharp = nominal.buffer(shift, join_style="mitre", mitre_limit=MITRE)
+        way = _box_centre(sharp) - _box_centre(cut)
     least = nominal.buffer(shift - _KERF_TOLERANCE, quad_segs=8)
     most = nominal.buffer(shift + _KERF_TOLERANCE, join_style="mitre", mitre_limit=2 * MITRE)
-    there = _box_centre(sharp) - _box_centre(cut)
-    placed = affinity.translate(cut, *np.where(np.isnan(way), there, way))
+    placed = affinity.translate(cut, *way)
     return bool(placed.covers(least) and most.covers(placed))
 
 

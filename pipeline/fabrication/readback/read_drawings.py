@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,12 +51,12 @@ class Curve:
     # (k, 2, 2) ends of the places of an outer cut that the file leaves uncut
     tabs: Floats = field(default_factory=lambda: np.empty((0, 2, 2)))
 
-    @property
+    @cached_property
     def polygon(self) -> Polygon:
         """The area of a closed curve."""
         return Polygon(self.points)
 
-    @property
+    @cached_property
     def line(self) -> Geometry:
         """The curve as a line; a closed one comes back to its start."""
         if len(self.points) < 2:
@@ -113,15 +114,19 @@ def read_drawing(path: Path) -> Drawing:
     drawing = _read_svg(path) if path.suffix == ".svg" else _read_dxf(path)
     drawing = replace(drawing, curves=tuple(_joined(drawing.curves)))
     outlines = [(part, outline) for part, outline in drawing.outlines() if part]
+    curves = list(drawing.curves)
+    lost = [
+        number
+        for number, curve in enumerate(curves)
+        if not curve.part and curve.layer != OUTER and len(curve.points)
+    ]
+    starts = np.array([curves[number].points[0] for number in lost]).reshape(-1, 2)
     tree = STRtree([outline for _, outline in outlines])
-
-    def owner(curve: Curve) -> str:
-        if curve.part or curve.layer == OUTER or len(curve.points) == 0:
-            return curve.part
-        around = tree.query(Point(curve.points[0]), predicate="intersects")
-        return outlines[int(min(around))][0] if len(around) else ""
-
-    return replace(drawing, curves=tuple(replace(c, part=owner(c)) for c in drawing.curves))
+    around = tree.query(shapely.points(starts), predicate="intersects").T
+    first = dict(sorted(around.tolist(), reverse=True))  # outline around each
+    for at, outer in first.items():
+        curves[lost[at]] = replace(curves[lost[at]], part=outlines[outer][0])
+    return replace(drawing, curves=tuple(curves))
 
 
 def _joined(curves: Iterable[Curve]) -> Iterator[Curve]:
@@ -181,16 +186,42 @@ def _dxf_curve(entity: DXFEntity) -> Curve:
         part = words[0] if words else ""
     own = int(entity.dxf.get("color", _BYLAYER)) != _BYLAYER
     try:
-        outline = path.make_path(entity)
+        points = _straight_points(entity)
+        if points is None:
+            outline = path.make_path(entity)
+            points = np.array([(p.x, p.y) for p in outline.flattening(_FLATNESS)]).reshape(-1, 2)
     except TypeError:
         return Curve(part, layer, kind, np.empty((0, 2)), closed=False, own_colour=own)
-    points = np.array([(p.x, p.y) for p in outline.flattening(_FLATNESS)]).reshape(-1, 2)
     closed = kind == "CIRCLE" or bool(getattr(entity, "is_closed", False))
     return Curve(part, layer, kind, _without_return(points, closed), closed, own)
 
 
+def _straight_points(entity: DXFEntity) -> Floats | None:
+    """Lists the points (n, 2) of a flat polyline without arcs, as its path would; None of others.
+
+    A closed one comes back to its start.
+    """
+    from ezdxf.entities.lwpolyline import LWPolyline
+    from ezdxf.entities.polyline import Polyline
+
+    if entity.dxf.hasattr("extrusion"):
+        return None
+    if isinstance(entity, LWPolyline):
+        values = entity.lwpoints.values
+        if values[:, 4].any():
+            return None
+        points = values[:, :2]
+    elif isinstance(entity, Polyline) and entity.is_2d_polyline and not entity.has_arc:
+        points = np.array([point.xyz for point in entity.points()]).reshape(-1, 3)[:, :2]
+    else:
+        return None
+    if entity.is_closed and (points[:1] != points[-1:]).any():
+        points = np.concatenate([points, points[:1]])
+    return points if len(points) > 1 else points[:0]
+
+
 def _without_return(points: Floats, closed: bool) -> Floats:
-    if closed and len(points) > 1 and np.allclose(points[0], points[-1], rtol=0, atol=1e-9):
+    if closed and len(points) > 1 and (np.abs(points[0] - points[-1]) <= 1e-9).all():
         return points[:-1]
     return points
 
@@ -230,7 +261,8 @@ def _svg_curves(group: Any, layer: str, height: float) -> Iterator[tuple[Curve, 
                 centre = [element.implicit_center.x, element.implicit_center.y]
                 strokes = [(centre + float(element.implicit_r) * _CIRCLE, True)]
             else:
-                strokes = [_svg_points(stroke) for stroke in Path(element).as_subpaths()]
+                outline = element if isinstance(element, Path) else Path(element)
+                strokes = [_svg_points(stroke) for stroke in outline.as_subpaths()]
             for points, closed in strokes:
                 turned = points * [1.0, -1.0] + [0.0, height]
                 yield Curve(part, layer, kind, turned, closed), str(element.stroke)
