@@ -44,7 +44,8 @@ def check_assembled(solid: MeshBody, record: PackageRecord) -> Iterator[Fault]:
         yield solid.fault(f"unit {label} is not in its place")
     for label, shape in shapes.items():
         design, vertices = expected.polygons[label], expected.slots[label]
-        yield from check_section(UnitSection(label, solid.file, design, shape, vertices), settings)
+        section = UnitSection(label, solid.file, design, shape, vertices, record.slots.get(label))
+        yield from check_section(section, settings)
     labels, outlines = list(shapes), np.array(list(shapes.values()))
     for first, second, gap in closest(outlines, settings.minimum_gap - TOLERANCE):
         what = f"{gap:.3f} mm from unit {labels[second]}, less than {settings.minimum_gap:g} mm"

@@ -5,11 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from shapely import Polygon
 
 from pipeline.fabrication.checks.package_record import PackageRecord
 from pipeline.fabrication.checks.sheet_checks import rectangle_sides
-from pipeline.fabrication.checks.slot_checks import measured_slots
 from pipeline.fabrication.papers import BILL, read_bill
 from pipeline.fabrication.parts import SHIM_PLAY
 from pipeline.fabrication.readback import BUG, Drawing, Fault
@@ -54,12 +52,10 @@ def _shim_of(row: Mapping[str, str]) -> str:
 
 def _shim_lengths(record: PackageRecord) -> dict[int, float]:
     """Measures ligaments from slot end to slot end along the shim, mm, by their numbers."""
-    designs = record.expected.polygons
     held = {
         (label, slot.vertex): np.asarray(slot.held.coords)
-        for label, shape in record.shapes.items()
-        if isinstance(shape, Polygon)
-        for slot in measured_slots(designs[label], shape, record.settings.slot_width)
+        for label, slots in record.slots.items()
+        for slot in slots
     }
     return {
         number: _along(*(held[end] for end in joint))

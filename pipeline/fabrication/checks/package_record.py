@@ -8,6 +8,7 @@ from pathlib import Path
 import xarray as xr
 from shapely import Geometry, Polygon
 
+from pipeline.fabrication.checks.slot_checks import MeasuredSlot, measured_slots
 from pipeline.fabrication.readback import BUG, Drawing, Fault, read_drawing
 from pipeline.fabrication.units import network
 from pipeline.problem.sections import Fabrication
@@ -59,6 +60,16 @@ class PackageRecord:
     shapes: Shapes  # outlines of the units in the assembled specimen
     settings: Fabrication  # of the fabrication
     letters: Mapping[str, str]  # carried by small units instead of their ids, by id
+
+    @cached_property
+    def slots(self) -> dict[str, list[MeasuredSlot]]:
+        """Slots of the units of the assembled specimen that are in one piece, by label."""
+        designs, width = self.expected.polygons, self.settings.slot_width
+        return {
+            label: measured_slots(designs[label], shape, width)
+            for label, shape in self.shapes.items()
+            if isinstance(shape, Polygon)
+        }
 
     @cached_property
     def drawings(self) -> dict[tuple[str, str], list[Drawing]]:

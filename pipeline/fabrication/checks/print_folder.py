@@ -207,6 +207,7 @@ def _is_same(one: MeshBody, other: MeshBody) -> bool:
         abs(volume - same) >= VOLUME_TOLERANCE * same
     ):
         return False
-    ours, theirs = (solid.vertices - solid.extent[0] for solid in (one, other))
+    ours = one.vertices - one.extent[0]
+    theirs = other.mesh.vertices - other.extent[0]  # an STL has them once per triangle
     there, back = KDTree(theirs).query(ours)[0], KDTree(ours).query(theirs)[0]
     return bool(max(there.max(), back.max()) < _NEAR)

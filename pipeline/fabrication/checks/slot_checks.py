@@ -145,6 +145,8 @@ class UnitSection:
     design: Polygon  # the polygon as designed
     made: Geometry  # the outline in the file, in the design's frame
     ligaments: Sequence[int]  # vertices at which a ligament ends, one entry a ligament
+    # measures of the slots, where they are known
+    slots: Sequence[MeasuredSlot] | None = None
 
     def fault(self, what: str, key: str, remedy: str, spot: Geometry) -> Fault:
         """Makes a fault of the unit at a spot."""
@@ -160,7 +162,9 @@ def check_section(shape: UnitSection, settings: Fabrication) -> Iterator[Fault]:
         yield shape.fault(what, "slots.depth_max", "lower it", made)
         return
     yield from _check_hairlines(shape, made)
-    found = measured_slots(shape.design, made, settings.slot_width)
+    found = shape.slots
+    if found is None:
+        found = measured_slots(shape.design, made, settings.slot_width)
     yield from _check_area(shape, closed(made, settings.slot_width), settings)
     at, ends = sorted(slot.vertex for slot in found), sorted(shape.ligaments)
     if at != ends:

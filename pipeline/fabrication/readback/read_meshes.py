@@ -56,7 +56,7 @@ class MeshBody:
         faces = np.ascontiguousarray(self.mesh.faces, dtype=np.uint32)
         return Manifold(Mesh(np.ascontiguousarray(self.mesh.vertices, dtype=np.float32), faces))
 
-    @property
+    @cached_property
     def extent(self) -> tuple[Floats, Floats]:
         """Lower and upper corner of its bounding box."""
         return self.vertices.min(axis=0), self.vertices.max(axis=0)
@@ -126,8 +126,8 @@ def _placed(path: Path, body: _Element, transform: str | None) -> MeshBody:
 
 
 def _table(body: _Element, tag: str, columns: Sequence[str]) -> Floats:
-    rows = [[float(row.get(column, "nan")) for column in columns] for row in body.iter(_CORE + tag)]
-    return np.array(rows).reshape(-1, len(columns))
+    values = [row.get(column, "nan") for row in body.iter(_CORE + tag) for column in columns]
+    return np.array(list(map(float, values))).reshape(-1, len(columns))
 
 
 def check_solid(solid: MeshBody, *, bodies: int = 1) -> Iterator[Fault]:
