@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import LineString, Polygon, affinity
 from shapely.geometry.base import BaseGeometry
 
@@ -202,7 +203,12 @@ def _room_for(
 ) -> tuple[float, float] | None:
     """Finds the centre of a box in an outline, nearest to its centroid or to ``near``."""
     target = outline.centroid if near is None else near
-    centres = _centres(box, angle, outline, _STEP, target)
+    rim = _rim(box, angle)
+    region = _region(rim, outline)
+    centres = _nearest(region, target)
+    if not _fits(centres, rim, outline).any():
+        centres = _grid(region, _STEP)
+        centres = centres[_fits(centres, rim, outline)]
     if not len(centres):
         return None
     distance = np.linalg.norm(centres - [target.x, target.y], axis=1)
@@ -213,28 +219,56 @@ def _room_for(
 def _centres(
     box: Box, angle: float, outline: Polygon, step: float, target: shapely.Point
 ) -> Floats:
-    """Finds centres (n, 2) of boxes inside an outline: the nearest to a target, and on a grid.
+    """Finds centres (n, 2) of boxes inside an outline: the nearest to a target, and on a grid."""
+    rim = _rim(box, angle)
+    region = _region(rim, outline)
+    centres = np.concatenate([_nearest(region, target), _grid(region, step)])
+    fits: Floats = centres[_fits(centres, rim, outline)]
+    return fits
 
-    The centre lies in each copy of the outline that is shifted by minus a point of the box's rim.
+
+def _rim(box: Box, angle: float) -> Floats:
+    """Lists the corners of a box about the origin and the middles of its sides (8, 2)."""
+    corners = np.asarray(_box_at(box, angle, (0.0, 0.0)).exterior.coords)
+    return np.concatenate([corners[:-1], (corners[:-1] + corners[1:]) / 2])
+
+
+def _region(rim: Floats, outline: Polygon) -> BaseGeometry:
+    """Covers where the centre of a box with a rim (8, 2) may lie inside an outline.
+
+    It lies in each copy of the outline that is shifted by minus a point of the box's rim.
     """
-    rim = np.asarray(_box_at(box, angle, (0.0, 0.0)).exterior.coords)
-    rim = np.concatenate([rim[:-1], (rim[:-1] + rim[1:]) / 2])
     copies = [shapely.transform(outline, lambda at, by=by: at - by) for by in rim]
+    if shapely.disjoint(copies[:2], copies[2:4]).any():  # of opposite corners
+        return Polygon()
     try:
         region = shapely.intersection_all(copies)
     except shapely.GEOSException:  # it gives up where copies nearly coincide
         region = shapely.intersection_all(shapely.set_precision(copies, _GRID))
-    if region.area == 0.0:
+    return region if region.area > 0.0 else Polygon()
+
+
+def _nearest(region: BaseGeometry, target: shapely.Point) -> Floats:
+    """Finds the point (1, 2) of a region nearest to a target; none (0, 2) of an empty region."""
+    return shapely.get_coordinates(shapely.shortest_line(region, target))[:1]
+
+
+def _grid(region: BaseGeometry, step: float) -> Floats:
+    """Lists the points (n, 2) of a grid that lie in a region."""
+    if region.is_empty:
         return np.empty((0, 2))
-    nearest = shapely.get_coordinates(shapely.shortest_line(region, target))[0]
     x0, y0, x1, y1 = region.bounds
     x, y = np.meshgrid(np.arange(x0, x1, step), np.arange(y0, y1, step))
     grid = np.column_stack([x.ravel(), y.ravel()])
-    centres = np.concatenate([nearest[None], grid[shapely.contains_xy(region, grid)]])
+    inside: Floats = grid[shapely.contains_xy(region, grid)]
+    return inside
+
+
+def _fits(centres: Floats, rim: Floats, outline: Polygon) -> NDArray[np.bool_]:
+    """Tests which boxes with a rim (8, 2) about centres (n, 2) lie inside an outline (n,)."""
     boxes = shapely.polygons(centres[:, None, :] + rim[[0, 4, 1, 5, 2, 6, 3, 7]] * (1.0 - 1e-6))
     shapely.prepare(outline)
-    fits: Floats = centres[shapely.contains(outline, boxes)]
-    return fits
+    return np.asarray(shapely.contains(outline, boxes))
 
 
 def _box_at(size: Box, angle: float, centre: tuple[float, float]) -> Polygon:

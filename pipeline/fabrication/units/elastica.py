@@ -87,5 +87,6 @@ def _newton_step(start: float, end: float, unknowns: Floats) -> Floats:
     hessian = mixed + mixed.T + 2 * along * (_RATE * _WEIGHTS) @ _RATE.T
     hessian -= (_SLOPE * weights) @ _SLOPE.T
     gradient = d_along * bending + along * d_bending + multiplier * d_across
-    bordered = np.block([[hessian, d_across[:, None]], [d_across, np.zeros(1)]])
+    bordered = np.zeros((_TERMS + 1, _TERMS + 1))
+    bordered[:-1, :-1], bordered[:-1, -1], bordered[-1, :-1] = hessian, d_across, d_across
     return np.asarray(np.linalg.solve(bordered, -np.append(gradient, sine.sum())))

@@ -204,8 +204,11 @@ def _walls(
     starts = np.broadcast_to(mouth, ends.shape) + 0.01 * directions
     cores = shapely.linestrings(np.stack([starts, ends], axis=1))
     shapely.prepare(room)
-    inside = shapely.contains(room, caps) & shapely.contains(room, cores)
-    return np.where(inside, shapely.distance(caps, room.exterior), -1.0)
+    inside = np.flatnonzero(shapely.contains(room, caps))
+    inside = inside[shapely.contains(room, cores[inside])]
+    walls = np.full(len(caps), -1.0)
+    walls[inside] = shapely.distance(caps[inside], room.exterior)
+    return walls
 
 
 def truncations(

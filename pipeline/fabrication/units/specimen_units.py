@@ -22,7 +22,7 @@ from pipeline.fabrication.units.prebend import prebend
 from pipeline.fabrication.units.tracking_dots import dots, pin_holes
 from pipeline.fabrication.units.unit_bodies import UnitBody, unit_bodies
 from pipeline.fabrication.units.unit_network import UnitNetwork, refuse_faults
-from pipeline.fabrication.units.unit_outlines import cut, filleted
+from pipeline.fabrication.units.unit_outlines import filleted
 from pipeline.problem.sections import Fabrication
 
 _HAIR = 1e-6
@@ -84,8 +84,7 @@ def build_unit(
         UnbuildableUnitError: its id has no room.
     """
     label, design = net.labels[number], net.polygons[number]
-    body, slots = made
-    outline = cut(body, slots, settings)
+    body, slots, outline = made
     for words in (label, *letters):
         placed = place_id(words, outline, body, settings.labels)
         if placed is not None:

@@ -32,10 +32,11 @@ _BETTER = 0.99  # of the sum of squared strains, for which slots are moved
 
 
 class UnitBody(NamedTuple):
-    """Holds a unit without its slots, which are yet to be cut, and these."""
+    """Holds a unit without its slots, these, and the outline with them."""
 
     body: Polygon
     slots: tuple[Slot, ...]
+    outline: Polygon
 
 
 def unit_bodies(net: UnitNetwork, settings: Fabrication, file: Path) -> dict[int, UnitBody]:
@@ -135,7 +136,7 @@ def unit_body(
             for slot in chosen
         )
         if all(_is_held(slot, settings) for slot in slots):
-            return UnitBody(body, slots)
+            return UnitBody(body, slots, outline)
     fault = _no_slot(net.labels[number], design, failure, settings, file)
     if settings.fillet_radius > 0.0:
         sharp = settings.model_copy(update={"fillet_radius": 0.0})
