@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.fabrication.parts import Mesh
+from sim.core import Floats, Ints
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the first date that a zip file can hold
 _HEADER = b"millimetres".ljust(80, b"\0")  # programs in C read it as far as a zero
@@ -73,11 +74,14 @@ def write_3mf(parts: Sequence[tuple[str, Mesh, float, float]], path: Path) -> No
 
 
 def _object(number: int, name: str, mesh: Mesh) -> str:
-    vertices = "".join(
-        f'<vertex x="{x:.5f}" y="{y:.5f}" z="{z:.5f}"/>' for x, y, z in mesh.vertices
-    )
-    faces = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.faces.tolist())
+    vertices = _rows('<vertex x="%.5f" y="%.5f" z="%.5f"/>', mesh.vertices)
+    faces = _rows('<triangle v1="%d" v2="%d" v3="%d"/>', mesh.faces)
     return (
         f'<object id="{number}" name="{name}" type="model"><mesh><vertices>{vertices}</vertices>'
         f"<triangles>{faces}</triangles></mesh></object>\n"
     )
+
+
+def _rows(row: str, values: Floats | Ints) -> str:
+    """Formats all rows of a table at once."""
+    return (row * len(values)) % tuple(values.ravel().tolist())

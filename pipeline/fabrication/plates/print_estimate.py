@@ -8,7 +8,6 @@ times it is off by less than 15 % (tests/clients/test_fabrication.py).
 
 import math
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -50,20 +49,23 @@ def estimate_print(parts: Iterable[PrintedPart], infill: float) -> PrintEstimate
 
 def _part(part: PrintedPart, infill: float) -> PrintEstimate:
     seconds = volume = 0.0
-    far, surfaces = math.hypot(*part.size), list(_surfaces(part))
-    for layer in part.layers:
+    far = math.hypot(*part.size)
+    insides = [layer.area.buffer(-PERIMETERS * PITCH, join_style="mitre") for layer in part.layers]
+    large = any(_is_large(area) for inside in insides for area in shapely.get_parts(inside))
+    surfaces = list(_surfaces(part)) if large else []
+    for layer, inside in zip(part.layers, insides, strict=True):
         count = (layer.top - layer.bottom) / LAYER
-        inside = layer.area.buffer(-PERIMETERS * PITCH, join_style="mitre")
         loops = list(_loops(layer.area))
         length = sum(float(edges.sum()) for edges, _ in loops)
         once = sum(float(_run(edges, speed).sum()) for edges, speed in loops)
         solid = sum(
-            max(0.0, min(layer.top, high) - max(layer.bottom, low)) * inside.intersection(area).area
+            (min(layer.top, high) - max(layer.bottom, low)) * inside.intersection(area).area
             for low, high, area in surfaces
+            if low < layer.top and layer.bottom < high
         )
         for area in (each for each in shapely.get_parts(inside) if each.area > 0.0):
             share = 1.0
-            if area.area > SOLID_BELOW:
+            if _is_large(area):
                 share = min(1.0, solid / (inside.area * (layer.top - layer.bottom)))
             for density, speed in ((share, SOLID), ((1.0 - share) * infill, SPARSE)):
                 length += density * area.area / PITCH
@@ -72,6 +74,11 @@ def _part(part: PrintedPart, infill: float) -> PrintEstimate:
         seconds += count * (once + pieces * (far / TRAVEL + RETRACTION))
         volume += count * length * PITCH * LAYER
     return PrintEstimate(seconds, volume / STRAND)
+
+
+def _is_large(area: BaseGeometry) -> bool:
+    """Tests that an area is too large to be filled as a solid whatever lies above and below."""
+    return bool(area.area > SOLID_BELOW)
 
 
 def _surfaces(part: PrintedPart) -> Iterator[tuple[float, float, BaseGeometry]]:
@@ -89,9 +96,9 @@ def _loops(area: BaseGeometry) -> Iterator[tuple[Floats, float]]:
         ring = area.buffer(-(number + 0.5) * PITCH, join_style="mitre").simplify(0.01)
         for polygon in (each for each in shapely.get_parts(ring) if each.area > 0.0):
             for line in (polygon.exterior, *polygon.interiors):
-                edges = np.array([math.dist(*ends) for ends in pairwise(line.coords)])
+                edges = np.hypot(*np.diff(shapely.get_coordinates(line), axis=0).T)
                 usual = OUTER if number == 0 else INNER
-                yield edges, usual if line.length > SMALL_LOOP else SMALL
+                yield edges, usual if edges.sum() > SMALL_LOOP else SMALL
 
 
 def _filled(area: Polygon, density: float, speed: float) -> float:
