@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from copy import copy
 from functools import lru_cache, partial
-from typing import Any, Self
+from typing import Any, Self, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +17,9 @@ from sim.scene.scene import Scene
 from sim.solvers import LinearRamp, concrete, differentiable_motion
 from sim.structure import ConcreteParameters, Parameters, parameters, parameters_at, shape
 
+Passed: TypeAlias = float | Floats | tuple[Any, ...]
+"""What a map depends on besides: numbers, arrays, and tuples of them."""
+
 
 class ParameterMap:
     """Compiles a differentiable map (JAX) from designs to parameters, and its pull-back.
@@ -24,13 +27,13 @@ class ParameterMap:
     What is ``passed`` stands behind the design vector.
     """
 
-    def __init__(self, of_design: Callable[..., Parameters[Array]], *passed: Floats) -> None:
+    def __init__(self, of_design: Callable[..., Parameters[Array]], *passed: Passed) -> None:
         self._of_design, self._passed = jax.jit(of_design), passed
         self._pull_back = jax.jit(
             lambda design, bar, *passed: jax.vjp(lambda x: of_design(x, *passed), design)[1](bar)[0]
         )
 
-    def passing(self, *passed: Floats) -> Self:
+    def passing(self, *passed: Passed) -> Self:
         """Returns the map that passes something else, compiled no second time."""
         other = copy(self)
         other._passed = passed

@@ -16,6 +16,9 @@ from .gaps import displaced as displaced
 from .gaps import overlapping_pairs as overlapping_pairs
 from .gaps import polygons as polygons
 from .gaps import smallest_gap as smallest_gap
+from .geometry import LatticeArrays as LatticeArrays
+from .geometry import Shape as Shape
+from .geometry import arrays_of as arrays_of
 from .geometry import shape as shape
 from .geometry import unwrap as unwrap
 from .geometry import void_angles as void_angles

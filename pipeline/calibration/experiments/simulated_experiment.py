@@ -16,13 +16,40 @@ from sim.core import Floats, Numbers
 from sim.quasistatics import StaticSolver
 from sim.scene import GradientChain, ParameterMap
 from sim.solvers import MotionLaw, PrescribedMotion, concrete, differentiable_motion, solve_cases
-from sim.structure import Lattice, Material, Parameters, parameters, shape
+from sim.structure import (
+    Lattice,
+    LatticeArrays,
+    Material,
+    Parameters,
+    Shape,
+    arrays_of,
+    parameters,
+    shape,
+)
 from sim.time_integration import ImplicitSolver, time_grid
 
 AnySolver = StaticSolver | ImplicitSolver
 
 Seen = Callable[[Numbers, Parameters], Array]
 """What is measured of a motion (n_times, n_units, 3) of given parameters."""
+
+
+def _of_numbers(
+    numbers: Array,
+    lattice: LatticeArrays,
+    made: Shape,
+    density: Numbers,
+    contact: Numbers,
+    stiffer: Numbers,
+) -> Parameters[Array]:
+    """Derives the parameters of a specimen from its numbers (5,)."""
+    axial, shear, bending, translation, rotation = (numbers[k] for k in range(5))
+    stiffness = stiffer[:, 0] * axial, stiffer[:, 1] * shear, stiffer[:, 2] * bending
+    return parameters(lattice, made, Material(density, *stiffness, contact, translation, rotation))
+
+
+_OF_NUMBERS = ParameterMap(_of_numbers)
+"""Compiles once for all specimens of a size: what tells them apart is passed."""
 
 
 @dataclass(frozen=True)
@@ -40,25 +67,10 @@ class SpecimenSimulation:
     stiffer: Floats = field(default_factory=lambda: np.ones((1, 3)))
 
     @cached_property
-    def parameters(self) -> Callable[[Numbers], Parameters[Array]]:
-        """Compiled map from a specimen's numbers (5,) to what the solvers take."""
-        made = shape(self.lattice, self.vertices)
-
-        @jax.jit
-        def of_numbers(numbers: Numbers) -> Parameters[Array]:
-            axial, shear, bending, translation, rotation = (numbers[k] for k in range(5))
-            made_of = Material(
-                self.density,
-                self.stiffer[:, 0] * axial,
-                self.stiffer[:, 1] * shear,
-                self.stiffer[:, 2] * bending,
-                self.contact,
-                translation,
-                rotation,
-            )
-            return parameters(self.lattice, made, made_of)
-
-        return of_numbers
+    def parameters(self) -> ParameterMap:
+        """Map from a specimen's numbers (5,) to what the solvers take."""
+        lattice, made = arrays_of(self.lattice), shape(self.lattice, self.vertices)
+        return _OF_NUMBERS.passing(lattice, made, self.density, self.contact, self.stiffer)
 
     @cached_property
     def _compiled(self) -> Seen:
@@ -119,7 +131,7 @@ class SpecimenSimulation:
         def weighted(motion: Array, made: Parameters[Array], bar: Array) -> tuple[Array, None]:
             return jnp.vdot(bar, self.seen(motion[0], made)), None
 
-        return GradientChain(ParameterMap(self.parameters), weighted)
+        return GradientChain(self.parameters, weighted)
 
     def _solver(self, constants: Constants) -> AnySolver:
         if constants.cutoff is None:
