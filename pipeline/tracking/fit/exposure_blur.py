@@ -65,8 +65,7 @@ class ExposureBlur:
         if way.any():
             count = int(np.clip(_PER_PIXEL * length, 3, _MOST))
             share = (np.arange(count) + 0.5) / count - 0.5
-            faces = [self._moved(self._sharp[unit][0], way * part) for part in share]
-            masks = [self._moved(self._sharp[unit][1], way * part) for part in share]
+            faces, masks = (self._moved(each, way, share) for each in self._sharp[unit])
             made.brightness[unit] = np.mean(faces, axis=0)
             made.weight[unit] = np.mean(masks, axis=0)
             bent = np.average(faces, axis=0, weights=share**2)
@@ -80,22 +79,18 @@ class ExposureBlur:
             made.cells.span[unit],
         )
 
-    def _moved(self, values: Singles, way: Floats) -> Singles:
-        """Moves nodes by part of a way; y goes up with the rows, as in the templates."""
+    def _moved(self, values: Singles, way: Floats, share: Floats) -> Singles:
+        """Moves nodes by parts of a way; y goes up with the rows, as in the templates."""
         middle, step = values.shape[0] // 2, self._templates.step
-        cos, sin = np.cos(way[2]), np.sin(way[2])
-        matrix = np.array([[cos, -sin, way[0] / step], [sin, cos, way[1] / step]])
-        matrix[:, 2] += middle - matrix[:, :2] @ [middle, middle]
-        return np.asarray(
-            cv2.warpAffine(
-                values,
-                matrix,
-                values.shape[::-1],
-                flags=cv2.INTER_CUBIC if values.min() < 0 or values.max() > 1 else cv2.INTER_LINEAR,
-                borderMode=cv2.BORDER_REPLICATE,
-            ),
-            np.float32,
-        )
+        kind = cv2.INTER_CUBIC if values.min() < 0 or values.max() > 1 else cv2.INTER_LINEAR
+        out = np.empty((len(share), *values.shape), np.float32)
+        for each, (x, y, turn) in zip(out, share[:, None] * way, strict=True):
+            cos, sin = np.cos(turn), np.sin(turn)
+            matrix = np.array([[cos, -sin, x / step], [sin, cos, y / step]])
+            matrix[:, 2] += middle - matrix[:, :2] @ [middle, middle]
+            size, border = values.shape[::-1], cv2.BORDER_REPLICATE
+            cv2.warpAffine(values, matrix, size, dst=each, flags=kind, borderMode=border)
+        return out
 
 
 def _share(face: Reals, bent: Reals, weight: Reals, way: Floats) -> Floats:

@@ -65,10 +65,10 @@ class TemplateGrid:
             if depth is not None and back is not None:
                 shown = depth.silhouette(polygon, back[unit])
             self.inside[unit] = self.signed_distance(shown)
-            far = np.full(self.x.shape, np.inf)
+            square = np.full(self.x.shape, np.inf)
             for x, y in polygon[specimen.joined[unit, : len(polygon)]]:
-                far = np.minimum(far, np.hypot(self.x - x, self.y - y))
-            self.joint[unit] = far
+                square = np.minimum(square, (line - x) ** 2 + (line[:, None] - y) ** 2)
+            self.joint[unit] = np.sqrt(square)
         self.centre = specimen.centre
 
     def of(self, units: Ints) -> TemplateGrid:
@@ -80,16 +80,19 @@ class TemplateGrid:
 
     def signed_distance(self, polygon: Floats) -> Singles:
         """Measures from the nodes to a polygon about the centroid, positive inside, mm."""
-        far = np.full(self.x.shape, np.inf)
+        square = np.full(self.x.shape, np.inf)
         odd = np.zeros(self.x.shape, dtype=bool)
+        column, row = self.x[0], self.y[:, :1]  # broadcast: what depends on one alone costs nothing
         for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
             ex, ey = bx - ax, by - ay
-            along = ((self.x - ax) * ex + (self.y - ay) * ey) / (ex * ex + ey * ey)
-            along = np.clip(along, 0, 1)
-            far = np.minimum(far, np.hypot(self.x - ax - along * ex, self.y - ay - along * ey))
+            right, up = column - ax, row - ay
+            along = (right * ex + up * ey) / (ex * ex + ey * ey)
+            np.clip(along, 0, 1, out=along)
+            square = np.minimum(square, (right - along * ex) ** 2 + (up - along * ey) ** 2)
             if by != ay:
-                crossing = (self.y < ay) != (self.y < by)
-                odd ^= crossing & (self.x < ax + (self.y - ay) * ex / ey)
+                crossing = (row < ay) != (row < by)
+                odd ^= crossing & (column < ax + up * ex / ey)
+        far = np.sqrt(square)
         return np.where(odd, far, -far).astype(np.float32)
 
 

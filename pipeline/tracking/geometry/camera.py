@@ -73,7 +73,8 @@ class Camera:
     def _undistorting(self, pixels: Floats) -> Floats:
         """Solves for the radius (...) without distortion over that with it, by Newton's method."""
         first, second = self.radial
-        seen = np.maximum(np.linalg.norm((pixels - self.centre) / self.scale, axis=-1), 1e-12)
+        x, y = np.moveaxis((pixels - self.centre) / self.scale, -1, 0)
+        seen = np.maximum(np.sqrt(x**2 + y**2), 1e-12)
         radius = seen
         for _ in range(_INVERSE_STEPS):
             square = radius**2
@@ -119,7 +120,8 @@ class Camera:
 
         A fisheye f has r = atan(m) / m with m = f sqrt(s), another lens r = 1.
         """
-        square = np.sum((offset / self.scale) ** 2, axis=-1, keepdims=True)
+        scaled = offset / self.scale
+        square = scaled[..., :1] ** 2 + scaled[..., 1:] ** 2  # a sum over an axis of two is slow
         if not self.fisheye:
             return square, np.ones_like(square)
         m = np.maximum(self.fisheye * np.sqrt(square), _TINY)

@@ -1,5 +1,7 @@
 """Fits the camera that sees known points of a plane, and tells which others may have seen them."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.ndimage import map_coordinates
 from scipy.optimize import least_squares
@@ -91,8 +93,8 @@ def lens_variance(camera: Camera, alike: list[Camera], centre: Floats, motion: R
     cells = np.maximum(high - low, 1e-9) / (_NODES - 1)
     here, there = ((place - low).T / cells[:, None] for place in (now, centre))
     total = np.zeros((len(unit), 3))
-    for other in alike:
-        for dof, field in enumerate(_errors(camera, other, nodes)):
+    for errors in _errors(camera, alike, nodes):
+        for dof, field in enumerate(errors):
             rest = map_coordinates(field, there, order=1)[unit]
             total[:, dof] += (map_coordinates(field, here, order=1) - rest) ** 2
     out[known] = total
@@ -160,15 +162,15 @@ class _Lens:
         return np.concatenate([seen.reshape(-1, len(vector)), prior]) * self._unit
 
 
-def _errors(camera: Camera, other: Camera, places: Floats) -> Floats:
-    """Returns by how much (3, ...) shift and rotation at places (..., 2) differ for two cameras."""
-
-    def shift(at: Floats) -> Floats:
-        pixels = other.project(at) - camera.project(at)
-        return np.asarray(np.linalg.solve(camera.jacobian(at), pixels[..., None])[..., 0])
-
+def _errors(camera: Camera, others: list[Camera], places: Floats) -> Iterator[Floats]:
+    """Yields by how much (3, ...) shift and rotation at places (..., 2) differ for each other."""
     x, y = np.array([_STEP, 0.0]), np.array([0.0, _STEP])
-    along = (shift(places + x) - shift(places - x))[..., 1]
-    across = (shift(places + y) - shift(places - y))[..., 0]
-    turn = (along - across) / (4 * _STEP)
-    return np.asarray(np.concatenate([np.moveaxis(shift(places), -1, 0), [turn]]))
+    around = [places, places + x, places - x, places + y, places - y]
+    seen = [(camera.project(at), camera.jacobian(at)) for at in around]  # for all the others
+    for other in others:
+        here, right, left, up, down = (
+            np.linalg.solve(slopes, (other.project(at) - pixels)[..., None])[..., 0]
+            for at, (pixels, slopes) in zip(around, seen, strict=True)
+        )
+        turn = ((right - left)[..., 1] - (up - down)[..., 0]) / (4 * _STEP)
+        yield np.concatenate([np.moveaxis(here, -1, 0), [turn]])
