@@ -225,11 +225,9 @@ class _Growth:
 
     def placement(self, factor: complex, inside: Inside) -> Placement | None:
         """Returns the match at its largest; nothing if it is small."""
-        for reach in self._reach:
-            self._grow(reach)
-        if self.size < _LEAST:
+        place = self._grow()
+        if place is None:
             return None
-        place, _ = self._expected()
         self._patch[np.linalg.norm(place - self._seen(place), axis=1) > _GATE * self._pitch] = -1
         unit = np.flatnonzero(self._patch >= 0)
         if len(unit) < _LEAST:
@@ -244,19 +242,26 @@ class _Growth:
             self._continuing(),
         )
 
-    def _grow(self, reach: float) -> None:
-        for _ in range(_ROUNDS):
-            if self.size < _LEAST:
-                return
-            place, far = self._expected()
-            alone = (self._patch < 0) & (far < reach)
-            free = np.setdiff1d(np.arange(len(self._patches)), self._patch)
-            if not (alone.any() and len(free)):
-                return
-            unit, patch = match_one_to_one(place[alone], self._patches[free], _GATE * self._pitch)
-            if not len(unit):
-                return
-            self._patch[np.flatnonzero(alone)[unit]] = free[patch]
+    def _grow(self) -> Floats | None:
+        """Matches more units in turns; returns where all are expected, None if too few match."""
+        if self.size < _LEAST:
+            return None
+        place, far = self._expected()
+        for reach in self._reach:
+            for _ in range(_ROUNDS):
+                if not self._match((self._patch < 0) & (far < reach), place):
+                    break
+                place, far = self._expected()
+        return place
+
+    def _match(self, alone: Mask, place: Floats) -> bool:
+        """Gives units without a patch free ones at their places; tells whether there were any."""
+        free = np.setdiff1d(np.arange(len(self._patches)), self._patch)
+        if not (alone.any() and len(free)):
+            return False
+        unit, patch = match_one_to_one(place[alone], self._patches[free], _GATE * self._pitch)
+        self._patch[np.flatnonzero(alone)[unit]] = free[patch]
+        return bool(len(unit))
 
     def _continuing(self) -> int:
         """Counts patches without a unit that go on with the lattice, about a pitch from others."""
