@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import xarray as xr
 from matplotlib.axes import Axes
@@ -115,7 +116,7 @@ class SnapshotLayout:
         """Tells where the snapshots begin so that all of them are in the middle."""
         return LABEL + (style.TWO_COLUMNS - LABEL - BAR - self.columns * self.side) / 2
 
-    @property
+    @cached_property
     def labels(self) -> tuple[list[Label], list[Label]]:
         """Lists the labels above and left of the snapshots, each no longer than one of these."""
         path, room = self.path, self.side - GAP
@@ -150,8 +151,9 @@ def _wrapped(text: str, room: float) -> str:
     return "\n".join(lines)
 
 
+@lru_cache(maxsize=1024)
 def _length(text: str, size: float) -> float:
-    """Measures a line of text in points, mm."""
+    """Measures a line of text in points, mm: by its outline, for which lines come again."""
     points = TextPath((0.0, 0.0), text, size=size).get_extents().width
     return float(points) * style.MM_PER_INCH / 72.0
 
