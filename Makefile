@@ -8,7 +8,8 @@ PAGES := all fig1 index movies calibrate validation benchmark any_load
 PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains certificate front,$(addsuffix _$(product),$(STUDIES)))
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
-INSTALL = $(BIN)/python pipeline/workflow/install_lock.py $(if $(WHEELS),--wheels "$(WHEELS)")
+SETTING_UP = $(if $(wildcard .venv/requirements.lock),$(BIN)/python,$(PYTHON))
+INSTALL = $(SETTING_UP) pipeline/workflow/install_lock.py .venv --compiler requirements-compiler.lock $(if $(WHEELS),--wheels "$(WHEELS)")
 PYTEST ?= -n auto --dist loadscope --no-loadscope-reorder --ignore tests/clients --ignore tests/cluster --ignore tests/slow -m 'not slow'
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
@@ -65,28 +66,15 @@ help:
 setup: .venv/requirements.lock
 dev: .venv/requirements-dev.lock
 
-# The copy of a lock says what the environment holds; one without it was never finished.
+# An environment that is there stays with its Python.
 .venv/requirements.lock: requirements.lock
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
-	    echo "error: this needs Python 3.11 or newer, but '$(PYTHON)' is $$($(PYTHON) --version 2>/dev/null || echo not here)." \
+	@$(SETTING_UP) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
+	    echo "error: this needs Python 3.11 or newer, but '$(SETTING_UP)' is $$($(SETTING_UP) --version 2>/dev/null || echo not here)." \
 	    "Name another one: make $(or $(MAKECMDGOALS),setup) PYTHON=python3.12" >&2; exit 1; }
-	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
-	    echo "error: '$(PYTHON)' comes without venv or pip. On Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
-	@echo "Setting up .venv from requirements.lock (half a minute, once)" >&2
-	@test -e $@ || $(PYTHON) -m venv --clear .venv
-	@rm -f $@
 	@$(INSTALL) requirements.lock
-	@for each in "$${CC:-cc}" gcc clang; do \
-	    echo 'int one;' | $$each -x c -c -o /dev/null - 2>/dev/null && exit; done; \
-	    echo "No compiler of C is here: adding the one of requirements-compiler.lock" >&2; \
-	    $(INSTALL) requirements-compiler.lock
-	@cp requirements.lock $@
 
-.venv/requirements-dev.lock: requirements-dev.lock | setup
-	@echo "Adding what requirements-dev.lock names for tests, linters and documentation (once)" >&2
-	@rm -f $@
-	@$(INSTALL) requirements-dev.lock
-	@cp requirements-dev.lock $@
+.venv/requirements-dev.lock: requirements-dev.lock .venv/requirements.lock
+	@$(INSTALL) requirements.lock requirements-dev.lock
 
 # Into the same folder for every Python that is to be served: make wheels WHEELS=folder PYTHON=python3.12
 wheels:

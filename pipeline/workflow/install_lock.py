@@ -1,19 +1,24 @@
-"""Installs a lock into the environment that runs this: by uv, or by pip where uv cannot be had.
+"""Sets up an environment from locks: by uv, or by pip where uv cannot be had.
 
-``python install_lock.py LOCK [--wheels FOLDER]`` needs nothing but pip. uv comes from the lock as
-well; it is told the settings of pip by its environment, since command lines are seen by others.
-Byte code is left to the first import, unless Python is told to write none then.
+``python install_lock.py ENVIRONMENT LOCK...`` needs nothing but a Python with venv and pip. uv
+comes from the lock as well; it is told the settings of pip by its environment, since command lines
+are seen by others. Byte code is left to the first import, unless Python is told to write none then.
 """
 
 import argparse
 import ast
+import fcntl
 import os
 import re
+import shlex
+import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from tempfile import NamedTemporaryFile, TemporaryDirectory
 
 _UV_NAMES = {
     "index-url": ("UV_DEFAULT_INDEX",),
@@ -31,26 +36,119 @@ _UV_NAMES = {
 """Variables of uv by the settings of pip, in the order in which later ones prevail."""
 _SECTIONS = ("global", "install", ":env:")
 """Places of settings of `pip install`, in the order in which later ones prevail."""
+_LIBRARY = """
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+int32_t whole(double x) { return abs((int32_t)sin(x)); }
+"""
+"""Needs of a compiler what the solvers need: the headers of the C library, and a linker."""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Installs the lock; returns the exit code of what did, or did not."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Installs what the environment lacks of the locks, one process at a time.
+
+    Raises:
+        SystemExit: something cannot be made or installed, which is told.
+    """
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("lock", type=Path, help="pinned packages with hashes")
+    parser.add_argument("environment", type=Path, help="made anew unless it holds the first lock")
+    parser.add_argument("locks", type=Path, nargs="+", help="pinned packages with hashes")
     parser.add_argument("--wheels", type=Path, help="take all from this folder, without a network")
+    parser.add_argument("--compiler", type=Path, help="a lock to add where no compiler of C works")
     asked = parser.parse_args(arguments)
-    where = ["--no-index", "--find-links", str(asked.wheels)] if asked.wheels else []
+    environment = asked.environment.resolve()  # a link leads to it: venv makes none in its place
+    first = asked.locks[0]
+    with _turn(environment):
+        for lock in asked.locks:
+            # The copy of a lock says what the environment holds; one without was never finished.
+            copy = environment / lock.name
+            if copy.exists() and copy.read_bytes() == lock.read_bytes():
+                copy.touch()
+                continue
+            _say(f"Setting up {asked.environment} from {lock} (half a minute, once)")
+            if lock == first:
+                _prepare(environment, copy)
+            copy.unlink(missing_ok=True)
+            _install(environment, lock, asked.wheels)
+            if lock == first and asked.compiler and not has_compiler():
+                _say(f"No compiler of C works here: adding the one of {asked.compiler}")
+                _install(environment, asked.compiler, asked.wheels)
+            shutil.copyfile(lock, copy)
+
+
+@contextmanager
+def _turn(environment: Path) -> Iterator[None]:
+    """Waits until no other process sets up the environment."""
+    file = Path(".cache", f"{environment.name}.turn")
+    file.parent.mkdir(exist_ok=True)
+    with file.open("w") as turn:
+        try:
+            fcntl.flock(turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            _say(f"Waiting for another process, which sets up {environment.name}")
+            fcntl.flock(turn, fcntl.LOCK_EX)
+        except OSError:  # a file system without locks
+            pass
+        yield
+
+
+def _say(what: str) -> None:
+    sys.stderr.write(f"{what}\n")
+
+
+def _prepare(environment: Path, copy: Path) -> None:
+    """Makes an environment that was never finished; of another, forgets what it holds."""
+    if copy.exists():
+        for each in environment.glob("requirements*.lock"):
+            each.unlink()
+        return
+    if not find_spec("ensurepip"):
+        sys.exit(
+            f"error: '{sys.executable}' comes without venv or pip."
+            " On Debian and Ubuntu: apt-get install python3-venv"
+        )
+    command = [sys.executable, "-m", "venv", "--clear", str(environment)]
+    if subprocess.run(command, check=False).returncode:
+        sys.exit(f"error: '{sys.executable}' can make no environment in {environment}")
+
+
+def has_compiler() -> bool:
+    """Tells whether CC or a compiler on the path makes such libraries as the solvers are."""
+    return any(map(_compiles, (os.environ.get("CC", ""), "cc", "gcc", "clang")))
+
+
+def _compiles(compiler: str) -> bool:
+    with TemporaryDirectory() as folder, suppress(OSError, ValueError):
+        library = Path(folder, "library.so")
+        words = ["-std=c11", "-shared", "-fPIC", "-x", "c", "-", "-o", str(library), "-lm"]
+        command = [*shlex.split(compiler), *words]
+        subprocess.run(command, input=_LIBRARY, text=True, capture_output=True, check=False)
+        return library.exists()
+    return False
+
+
+def _install(environment: Path, lock: Path, wheels: Path | None) -> None:
+    """Installs a lock.
+
+    Raises:
+        SystemExit: neither uv nor pip can.
+    """
+    python, uv = environment / "bin/python", environment / "bin/uv"
+    where = ["--no-index", "--find-links", str(wheels)] if wheels else []
     install = ["install", "--quiet", "--require-hashes", *where]
-    pip = [sys.executable, "-m", "pip", *install, "--disable-pip-version-check"]
+    pip = [str(python), "-m", "pip", *install, "--disable-pip-version-check"]
     pip += ["-r"] if sys.dont_write_bytecode else ["--no-compile", "-r"]
-    if _install_uv(pip, asked.lock):
-        uv = [str(Path(sys.executable).with_name("uv")), "pip", *install, "-r", str(asked.lock)]
-        uv += ["--python", sys.executable, "--index-strategy", "unsafe-best-match"]
-        uv += ["--compile-bytecode"] if sys.dont_write_bytecode else []
-        if subprocess.run(uv, env=_uv_environment(), check=False).returncode == 0:
-            return 0
-    sys.stderr.write("uv cannot install here, pip does: a few minutes\n")
-    return subprocess.run([*pip, str(asked.lock)], check=False).returncode
+    if _install_uv(pip, lock):
+        words = [str(uv), "pip", *install, "-r", str(lock)]
+        words += ["--python", str(python), "--index-strategy", "unsafe-best-match"]
+        words += ["--compile-bytecode"] if sys.dont_write_bytecode else []
+        if subprocess.run(words, env=_uv_environment(python), check=False).returncode == 0:
+            return
+    _say("uv cannot install here, pip does: a few minutes")
+    code = subprocess.run([*pip, str(lock)], check=False).returncode
+    if code:
+        sys.exit(code)
 
 
 def uv_settings(listed: str) -> dict[str, str]:
@@ -75,9 +173,9 @@ def _is_there(place: str) -> bool:
     return bool(re.match(r"https?:", place)) or Path(place.removeprefix("file://")).exists()
 
 
-def _uv_environment() -> dict[str, str]:
+def _uv_environment(python: Path) -> dict[str, str]:
     """Returns the variables for uv: settings of pip, unless its own are there."""
-    command = [sys.executable, "-m", "pip", "config", "list"]
+    command = [str(python), "-m", "pip", "config", "list"]
     listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     own = {name: value for name, value in os.environ.items() if name.startswith("UV_")}
     return os.environ | uv_settings(listed) | own
@@ -95,4 +193,4 @@ def _install_uv(pip: Sequence[str], lock: Path) -> bool:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

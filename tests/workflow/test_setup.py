@@ -1,5 +1,6 @@
 """An environment from a folder of packages, without a network, by uv or by pip."""
 
+import fcntl
 import hashlib
 import json
 import os
@@ -17,6 +18,13 @@ from tests.tables import cases
 
 SECRET = "user:hunter2"
 UV = "uv.data/scripts/uv"
+PRETENDING = f"""#!/bin/sh
+case "$*" in
+*"-m pip install"*) echo "$*" >>told; exit "${{CODE:-0}}" ;;
+*) exec "{sys.executable}" "$@" ;;
+esac
+"""
+"""The Python of an environment, but that its pip only tells what it was asked for."""
 TELLING = """#!python
 import json, os, sys
 told = {name: value for name, value in os.environ.items() if name[:3] in ("UV_", "SSL")}
@@ -43,27 +51,70 @@ def wheel(folder: Path, name: str, files: dict[str, str], version: str = "1.0") 
     return f"{name}=={version} \\\n    --hash=sha256:{found}\n"
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with what sets up, whose environment is made once."""
-    folder, script = tmp_path_factory.mktemp("checkout"), Path("pipeline/workflow/install_lock.py")
+def checkout(folder: Path) -> Path:
+    """Puts what sets up into a folder."""
+    script = Path("pipeline/workflow/install_lock.py")
     (folder / script.parent).mkdir(parents=True)
     shutil.copy(ROOT / script, folder / script)
     shutil.copy(ROOT / "Makefile", folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with what sets up, whose environment is made once."""
+    folder = checkout(tmp_path_factory.mktemp("checkout"))
     (folder / "wheels").mkdir()
     (folder / "USB stick").symlink_to("wheels")
     return folder
+
+
+def own_environment() -> dict[str, str]:
+    """Variables without those of `make test` and of installers."""
+    others = ("MAKE", "MFL", "PIP_", "UV_")
+    return {name: value for name, value in os.environ.items() if not name.startswith(others)}
+
+
+@pytest.fixture
+def pretended(tmp_path: Path) -> Path:
+    """A folder with what sets up, whose environment is of an older lock and only pretends."""
+    (tmp_path / ".venv/bin").mkdir(parents=True)
+    (tmp_path / ".venv/bin/python").write_text(PRETENDING)
+    (tmp_path / ".venv/bin/python").chmod(0o755)
+    (tmp_path / ".venv/requirements.lock").write_text("older==1\n")
+    os.utime(tmp_path / ".venv/requirements.lock", (1, 1))
+    (tmp_path / "requirements.lock").write_text("nothing==1\n")
+    (tmp_path / "requirements-dev.lock").write_text("tool==1\n")
+    (tmp_path / "requirements-compiler.lock").write_text("compiler==1\n")
+    return checkout(tmp_path)
+
+
+def start(folder: Path, *words: str, **variables: str) -> subprocess.Popen[str]:
+    """Starts `make` with these words and variables of the environment."""
+    return subprocess.Popen(
+        ["make", *words],
+        cwd=folder,
+        env=own_environment() | variables,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def installed(folder: Path) -> list[str]:
+    """Names the locks that pip was asked for."""
+    told = folder / "told"
+    return [line.split()[-1] for line in told.read_text().splitlines()] if told.exists() else []
 
 
 def set_up(folder: Path, *lock: str, offline: bool = True) -> subprocess.CompletedProcess[str]:
     """`make setup` with these lines of a lock."""
     (folder / "requirements.lock").write_text("".join(lock))
     (folder / ".venv/requirements.lock").unlink(missing_ok=True)  # may be of the same moment
-    kept = {k: v for k, v in os.environ.items() if not k.startswith(("MAKE", "MFL", "PIP_", "UV_"))}
     return subprocess.run(
         ["make", "setup", *["WHEELS=USB stick"] * offline, f"PYTHON={sys.executable}"],
         cwd=folder,
-        env=kept | {"PIP_CONFIG_FILE": str(folder / "pip.conf")},
+        env=own_environment() | {"PIP_CONFIG_FILE": str(folder / "pip.conf")},
         capture_output=True,
         text=True,
         check=False,
@@ -72,6 +123,7 @@ def set_up(folder: Path, *lock: str, offline: bool = True) -> subprocess.Complet
 
 @pytest.mark.slow
 def test_a_folder_of_packages_is_enough(folder: Path) -> None:
+    (folder / ".venv").symlink_to("of a larger disk")
     line = wheel(folder / "wheels", "nothing", {"nothing.py": "value = 1\n"})
     ended = set_up(folder, line)
     assert ended.returncode == 0, ended.stdout + ended.stderr
@@ -109,6 +161,41 @@ def test_pip_installs_where_uv_fails(folder: Path) -> None:
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert "uv cannot install here, pip does" in ended.stderr
     subprocess.run([folder / ".venv/bin/python", "-c", "import other"], check=True)
+
+
+def test_of_two_at_once_one_sets_up_and_the_other_waits(pretended: Path) -> None:
+    turn = pretended / ".cache/.venv.turn"
+    turn.parent.mkdir()
+    with turn.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        both = [start(pretended, target) for target in ("setup", "dev")]
+        for each in both:
+            assert each.stderr
+            assert "Waiting for another process" in each.stderr.readline()
+    told = "".join(each.communicate()[1] for each in both)
+    assert [each.returncode for each in both] == [0, 0], told
+    assert installed(pretended) == ["requirements.lock", "requirements-dev.lock"]
+    assert "Nothing to be done" in start(pretended, "dev").communicate()[0]
+
+
+def test_a_lock_of_the_same_content_is_not_installed_again(pretended: Path) -> None:
+    shutil.copy(pretended / ".venv/requirements.lock", pretended)
+    assert start(pretended, "setup").wait() == 0
+    assert installed(pretended) == []
+
+
+@pytest.mark.parametrize("works", [True, False])
+def test_a_compiler_is_added_where_none_has_the_headers(pretended: Path, works: bool) -> None:
+    programs = pretended / "programs"
+    programs.mkdir()
+    for name in ("cc", "gcc", "clang"):
+        found = f'exec "{shutil.which("gcc")}" {"" if works else "-nostdinc"} "$@"'
+        (programs / name).write_text(f"#!/bin/sh\n{found}\n")
+        (programs / name).chmod(0o755)
+    path = f"{programs}:{os.environ['PATH']}"
+    told = start(pretended, "setup", PATH=path, CC="").communicate()[1]
+    added = ["requirements-compiler.lock"]
+    assert installed(pretended) == ["requirements.lock", *([] if works else added)], told
 
 
 @pytest.mark.parametrize("made_in", ["here", "elsewhere"])
