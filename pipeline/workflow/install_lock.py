@@ -9,6 +9,7 @@ import argparse
 import ast
 import fcntl
 import os
+import platform
 import re
 import shlex
 import shutil
@@ -18,7 +19,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import NamedTemporaryFile, TemporaryDirectory
+from tempfile import NamedTemporaryFile, TemporaryDirectory, TemporaryFile
 
 _UV_NAMES = {
     "index-url": ("UV_DEFAULT_INDEX",),
@@ -36,6 +37,8 @@ _UV_NAMES = {
 """Variables of uv by the settings of pip, in the order in which later ones prevail."""
 _SECTIONS = ("global", "install", ":env:")
 """Places of settings of `pip install`, in the order in which later ones prevail."""
+_WHEELS = "wheels"
+"""Is the file of an environment that holds the path of the folder of packages it came from."""
 _LIBRARY = """
 #include <math.h>
 #include <stdint.h>
@@ -58,7 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--compiler", type=Path, help="a lock to add where no compiler of C works")
     asked = parser.parse_args(arguments)
     environment = asked.environment.resolve()  # a link leads to it: venv makes none in its place
-    first = asked.locks[0]
+    wheels, first = _wheels(asked.wheels, environment), asked.locks[0]
+    os.environ.update({"PIP_USER": "0"} | _without_cache())  # an environment has no user's packages
     with _turn(environment):
         for lock in asked.locks:
             # The copy of a lock says what the environment holds; one without was never finished.
@@ -70,11 +74,36 @@ def main(arguments: Sequence[str] | None = None) -> None:
             if lock == first:
                 _prepare(environment, copy)
             copy.unlink(missing_ok=True)
-            _install(environment, lock, asked.wheels)
+            _install(environment, lock, wheels)
             if lock == first and asked.compiler and not has_compiler():
                 _say(f"No compiler of C works here: adding the one of {asked.compiler}")
-                _install(environment, asked.compiler, asked.wheels)
+                _install(environment, asked.compiler, wheels)
             shutil.copyfile(lock, copy)
+        if wheels:
+            (environment / _WHEELS).write_text(str(wheels), encoding="utf-8")
+
+
+def _wheels(named: Path | None, environment: Path) -> Path | None:
+    """Finds the folder of packages: the one that is named, or of an earlier call if still there."""
+    if named is None:
+        kept = environment / _WHEELS
+        folder = Path(kept.read_text(encoding="utf-8")) if kept.exists() else None
+        return folder if folder and folder.is_dir() else None
+    if not any(named.glob("*.whl")):
+        sys.exit(f"error: no packages are in the folder '{named}': make wheels fills one")
+    return named.resolve()
+
+
+def _without_cache() -> dict[str, str]:
+    """Returns the variables for uv and pip where the user's folder of caches cannot be written."""
+    try:
+        folder = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "uv"
+        folder.mkdir(parents=True, exist_ok=True)
+        TemporaryFile(dir=folder).close()
+    except (OSError, RuntimeError):  # no such folder, and nobody's home
+        elsewhere = {"UV_CACHE_DIR", "UV_NO_CACHE", "PIP_CACHE_DIR"} & os.environ.keys()
+        return {} if elsewhere else {"UV_NO_CACHE": "1", "PIP_NO_CACHE_DIR": "1"}
+    return {}
 
 
 @contextmanager
@@ -134,21 +163,37 @@ def _install(environment: Path, lock: Path, wheels: Path | None) -> None:
     Raises:
         SystemExit: neither uv nor pip can.
     """
+    if _can_install(environment, lock, wheels):
+        return
+    python = f"Python {sys.version_info.major}.{sys.version_info.minor} on {platform.machine()}"
+    packages = f"on a machine with one, for {python}: make wheels WHEELS=folder"
+    if wheels:
+        sys.exit(
+            f"error: {lock} cannot be installed from {wheels}, which has to be made for {python}"
+            f" and these locks. That takes a network; {packages}"
+        )
+    sys.exit(
+        f"error: {lock} cannot be installed. If that is for want of a network, {packages};"
+        " then here: make setup WHEELS=folder"
+    )
+
+
+def _can_install(environment: Path, lock: Path, wheels: Path | None) -> bool:
     python, uv = environment / "bin/python", environment / "bin/uv"
     where = ["--no-index", "--find-links", str(wheels)] if wheels else []
     install = ["install", "--quiet", "--require-hashes", *where]
     pip = [str(python), "-m", "pip", *install, "--disable-pip-version-check"]
     pip += ["-r"] if sys.dont_write_bytecode else ["--no-compile", "-r"]
-    if _install_uv(pip, lock):
+    if not _has_uv(pip, lock):  # nor can pip then install the whole
+        return False
+    if uv.exists():
         words = [str(uv), "pip", *install, "-r", str(lock)]
         words += ["--python", str(python), "--index-strategy", "unsafe-best-match"]
         words += ["--compile-bytecode"] if sys.dont_write_bytecode else []
         if subprocess.run(words, env=_uv_environment(python), check=False).returncode == 0:
-            return
-    _say("uv cannot install here, pip does: a few minutes")
-    code = subprocess.run([*pip, str(lock)], check=False).returncode
-    if code:
-        sys.exit(code)
+            return True
+        _say("uv cannot install here, pip does: a few minutes")
+    return subprocess.run([*pip, str(lock)], check=False).returncode == 0
 
 
 def uv_settings(listed: str) -> dict[str, str]:
@@ -181,11 +226,11 @@ def _uv_environment(python: Path) -> dict[str, str]:
     return os.environ | uv_settings(listed) | own
 
 
-def _install_uv(pip: Sequence[str], lock: Path) -> bool:
-    """Installs the uv of a lock; False where the lock has none or it cannot be had."""
+def _has_uv(pip: Sequence[str], lock: Path) -> bool:
+    """Installs the uv of a lock; False where it has one that cannot be had."""
     pinned = re.search(r"^uv==(.*\\\n)*.*$", lock.read_text(encoding="utf-8"), re.MULTILINE)
     if pinned is None:
-        return False
+        return True
     with NamedTemporaryFile("w", suffix=".lock") as alone:
         alone.write(pinned[0])
         alone.flush()

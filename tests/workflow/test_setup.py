@@ -83,6 +83,8 @@ def pretended(tmp_path: Path) -> Path:
     (tmp_path / ".venv/bin/python").chmod(0o755)
     (tmp_path / ".venv/requirements.lock").write_text("older==1\n")
     os.utime(tmp_path / ".venv/requirements.lock", (1, 1))
+    (tmp_path / "USB stick").mkdir()
+    (tmp_path / "USB stick/nothing-1.whl").touch()
     (tmp_path / "requirements.lock").write_text("nothing==1\n")
     (tmp_path / "requirements-dev.lock").write_text("tool==1\n")
     (tmp_path / "requirements-compiler.lock").write_text("compiler==1\n")
@@ -114,7 +116,7 @@ def set_up(folder: Path, *lock: str, offline: bool = True) -> subprocess.Complet
     return subprocess.run(
         ["make", "setup", *["WHEELS=USB stick"] * offline, f"PYTHON={sys.executable}"],
         cwd=folder,
-        env=own_environment() | {"PIP_CONFIG_FILE": str(folder / "pip.conf")},
+        env=own_environment() | {"PIP_CONFIG_FILE": str(folder / "pip.conf"), "PIP_USER": "1"},
         capture_output=True,
         text=True,
         check=False,
@@ -123,7 +125,7 @@ def set_up(folder: Path, *lock: str, offline: bool = True) -> subprocess.Complet
 
 @pytest.mark.slow
 def test_a_folder_of_packages_is_enough(folder: Path) -> None:
-    (folder / ".venv").symlink_to("of a larger disk")
+    (folder / ".venv").symlink_to("on_a_larger_disk")
     line = wheel(folder / "wheels", "nothing", {"nothing.py": "value = 1\n"})
     ended = set_up(folder, line)
     assert ended.returncode == 0, ended.stdout + ended.stderr
@@ -182,6 +184,46 @@ def test_a_lock_of_the_same_content_is_not_installed_again(pretended: Path) -> N
     shutil.copy(pretended / ".venv/requirements.lock", pretended)
     assert start(pretended, "setup").wait() == 0
     assert installed(pretended) == []
+
+
+def test_a_folder_of_packages_is_remembered_as_long_as_it_is_there(pretended: Path) -> None:
+    for words in (["setup", "WHEELS=USB stick"], ["dev"]):
+        assert start(pretended, *words).wait() == 0
+    (pretended / "USB stick").rename(pretended / "elsewhere")
+    (pretended / ".venv/requirements-dev.lock").unlink()
+    assert start(pretended, "dev").wait() == 0
+    asked = (pretended / "told").read_text().splitlines()
+    taken = f"--no-index --find-links {pretended}/USB stick"
+    assert [taken in each for each in asked] == [True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("wheels", "told"),
+    [
+        ([], "then here: make setup WHEELS=folder"),
+        (["WHEELS=USB stick"], "USB stick, which has to be made for Python 3"),
+        (["WHEELS=nowhere"], "no packages are in the folder 'nowhere'"),
+    ],
+)
+def test_what_cannot_be_installed_ends_with_one_message(
+    pretended: Path, wheels: list[str], told: str
+) -> None:
+    ended = start(pretended, "setup", *wheels, CODE="1")
+    said = ended.communicate()[1]
+    assert ended.returncode == 2
+    assert said.count("error: ") == 1
+    assert told in said
+    assert "uv cannot install here" not in said
+    assert not (pretended / ".venv/requirements.lock").exists() or wheels == ["WHEELS=nowhere"]
+
+
+def test_uv_keeps_no_cache_where_no_home_can_be_written(pretended: Path) -> None:
+    uv = pretended / ".venv/bin/uv"
+    uv.write_text('#!/bin/sh\necho "$UV_NO_CACHE" >>told\n')
+    uv.chmod(0o755)
+    ended = start(pretended, "setup", HOME="/dev/null", XDG_CACHE_HOME="")
+    assert ended.wait() == 0
+    assert (pretended / "told").read_text() == "1\n"
 
 
 @pytest.mark.parametrize("works", [True, False])
