@@ -1,6 +1,9 @@
 # Bootstrap and thin aliases. `make fig2` builds Figure 2 from nothing, `make test` runs the tests.
-# They presume Python >= 3.11 with venv and pip, and make.
+# They presume Python 3.11 to 3.13 with venv and pip, and make.
 SHELL := /bin/bash
+MAKEFLAGS += --no-builtin-rules
+# Of a cluster's modules: they would hide the packages of .venv.
+unexport PYTHONPATH PYTHONHOME
 PYTHON ?= python3
 BIN := .venv/bin
 STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml experiments/*/figure.yaml))))
@@ -17,6 +20,10 @@ WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 # Programs of an environment begin with its folder: in one that was moved they do not start.
 MOVED := $(shell [ -L .venv ] || [ ! -e .venv/bin/pip ] || head -n 2 .venv/bin/pip | grep -qF "$$(pwd -P)/.venv/" || echo yes)
 $(if $(MOVED),$(warning .venv was made in another folder, its programs may not start: rm -r .venv, then make setup))
+# The Python that made .venv may have been removed, replaced by a newer one, or be of a module that is not loaded.
+GONE := $(shell [ ! -e .venv/requirements.lock ] || [ -d .venv/lib/"$$($(BIN)/python -ISc \
+    'import sys; print("python%d.%d" % sys.version_info[:2])' 2>/dev/null)"/site-packages ] || echo yes)
+$(if $(GONE),$(warning the Python of .venv is not here any more: bring it back, or rm -r .venv, then make setup))
 
 # By the environment: names of folders never are words of a shell's command.
 export TARGET = $@
@@ -66,11 +73,17 @@ help:
 setup: .venv/requirements.lock
 dev: .venv/requirements-dev.lock
 
+# It runs in any Python, of which some print their version as an error.
+define refuse_other_pythons
+@$(1) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null || { \
+    found=$$($(1) --version 2>&1) || found="not here"; \
+    echo "error: this needs Python 3.11, 3.12 or 3.13, but '$(1)' is $$found." \
+    "Name another one: make $(or $(MAKECMDGOALS),setup) PYTHON=python3.12" >&2; exit 1; }
+endef
+
 # An environment that is there stays with its Python.
 .venv/requirements.lock: requirements.lock
-	@$(SETTING_UP) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
-	    echo "error: this needs Python 3.11 or newer, but '$(SETTING_UP)' is $$($(SETTING_UP) --version 2>/dev/null || echo not here)." \
-	    "Name another one: make $(or $(MAKECMDGOALS),setup) PYTHON=python3.12" >&2; exit 1; }
+	$(call refuse_other_pythons,$(SETTING_UP))
 	@$(INSTALL) requirements.lock
 
 .venv/requirements-dev.lock: requirements-dev.lock .venv/requirements.lock
@@ -78,9 +91,11 @@ dev: .venv/requirements-dev.lock
 
 # Into the same folder for every Python that is to be served: make wheels WHEELS=folder PYTHON=python3.12
 wheels:
-	@$(PYTHON) -m pip download --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock \
-	    -r requirements-compiler.lock \
-	    --dest "$(or $(WHEELS),wheels)"
+	$(call refuse_other_pythons,$(PYTHON))
+	@$(PYTHON) -m venv --clear .cache/download
+	@.cache/download/bin/python -m pip download --quiet --disable-pip-version-check --require-hashes \
+	    -r requirements-dev.lock -r requirements-compiler.lock --dest "$(or $(WHEELS),wheels)"
+	@rm -rf .cache/download
 
 $(STUDIES) $(PAGES): setup
 	@exec $(BIN)/python -m pipeline run "$$TARGET"

@@ -253,6 +253,63 @@ def test_an_environment_that_was_moved_is_told(tmp_path: Path, made_in: str) -> 
     assert ("made in another folder" in ended.stderr) is (made_in == "elsewhere")
 
 
+@pytest.mark.parametrize(
+    ("version", "told"),
+    [
+        ("2.7.18", "this needs Python 3.11, 3.12 or 3.13, but './other' is Python 2.7.18."),
+        ("3.14.0", "this needs Python 3.11, 3.12 or 3.13, but './other' is Python 3.14.0."),
+        (None, "this needs Python 3.11, 3.12 or 3.13, but './other' is not here."),
+    ],
+)
+@pytest.mark.parametrize("target", ["setup", "wheels"])
+def test_other_pythons_are_refused(
+    pretended: Path, target: str, version: str | None, told: str
+) -> None:
+    shutil.rmtree(pretended / ".venv")
+    if version:
+        found = f"import sys; sys.version_info = {tuple(map(int, version.split('.')))}"
+        (pretended / "other").write_text(
+            f'#!/bin/sh\n[ "$1" = -c ] || {{ echo Python {version} >&2; exit; }}\n'
+            f'exec "{sys.executable}" -c "{found}; $2"\n'
+        )
+        (pretended / "other").chmod(0o755)
+    ended = start(pretended, target, "PYTHON=./other")
+    assert told in ended.communicate()[1]
+    assert ended.returncode == 2
+
+
+def test_an_environment_that_is_there_stays_with_its_python(pretended: Path) -> None:
+    assert start(pretended, "setup", "PYTHON=/not/there").wait() == 0
+    assert installed(pretended) == ["requirements.lock"]
+
+
+@pytest.mark.parametrize("found", ["its Python", "no Python", "a newer Python"])
+def test_a_python_that_has_gone_is_told(pretended: Path, found: str) -> None:
+    version = "python{}.{}".format(*sys.version_info)
+    packages = pretended / ".venv/lib" / (version if found == "its Python" else "python3.1")
+    (packages / "site-packages").mkdir(parents=True)
+    python = pretended / ".venv/bin/python"
+    if found == "no Python":
+        python.unlink()
+        python.symlink_to("/not/there/python3.1")
+    said = start(pretended, "help").communicate()[1]
+    assert ("the Python of .venv is not here any more" in said) is (found != "its Python")
+
+
+def test_modules_of_a_cluster_hide_nothing(pretended: Path) -> None:
+    with (pretended / "Makefile").open("a") as file:
+        file.write("shown:\n\t@env\n")
+    shown = start(pretended, "shown", PYTHONPATH="/of/a/module", PYTHONHOME="/of/a/module")
+    assert "/of/a/module" not in shown.communicate()[0]
+
+
+def test_a_preset_without_a_name_is_no_target(pretended: Path) -> None:
+    problem = pretended / "experiments/fig2/problem.yaml"
+    problem.parent.mkdir(parents=True)
+    problem.touch()
+    assert "No rule to make target 'fig2@'" in start(pretended, "fig2@").communicate()[1]
+
+
 @cases("workflow", "listed, settings")
 def test_settings_of_pip_become_those_of_uv(listed: str, settings: dict[str, str]) -> None:
     assert uv_settings(listed) == settings
