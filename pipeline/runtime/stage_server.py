@@ -22,7 +22,6 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -134,25 +133,29 @@ def _passed_on(server: socket.socket) -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
 
 
-@dataclass
-class _Job:
+class _Job(NamedTuple):
     """A stage at work: its process, and the client that waits for it."""
 
     process: int
     client: socket.socket
-    ended: int
-    """Descriptor that can be read once the process has ended."""
 
 
 class _Server:
-    """Forks a process for every request, and tells its client how it ended."""
+    """Forks a process for every request, and tells its client how it ended.
 
-    def __init__(self, listener: socket.socket, life: int) -> None:
+    Args:
+        listener: takes the clients.
+        life: descriptor that can be read once the workflow has ended.
+        ended: descriptor that can be read when a stage may have.
+    """
+
+    def __init__(self, listener: socket.socket, life: int, ended: int) -> None:
         self._waiting = selectors.DefaultSelector()
-        self._jobs: set[int] = set()
-        self._listener, self._life = listener, life
+        self._jobs: set[_Job] = set()
+        self._listener, self._life, self._ended = listener, life, ended
         self._wait_for(listener.fileno(), self._accept)
         self._wait_for(life, self._finish)
+        self._wait_for(ended, self._look_for_ended)
 
     def serve(self) -> _Request | None:
         """Serves until the workflow has ended, and its stages. In a fork: returns what to run."""
@@ -188,14 +191,17 @@ class _Server:
             return request
         for stream in given:
             os.close(stream)
-        job = _Job(process, client, os.pidfd_open(process))
-        self._jobs.add(process)
-        self._wait_for(job.ended, lambda: self._tell(job))
-        self._wait_for(client.fileno(), lambda: self._hand_on(job))
+        self._watch(_Job(process, client))
         return None
+
+    def _watch(self, job: _Job) -> None:
+        self._jobs.add(job)
+        self._wait_for(job.client.fileno(), lambda: self._hand_on(job))
 
     def _leave(self) -> None:
         """Closes, in a fork, what belongs to the server and to other stages."""
+        os.close(signal.set_wakeup_fd(-1))
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         for key in list(self._waiting.get_map().values()):
             os.close(key.fd)
         self._waiting.close()
@@ -208,16 +214,21 @@ class _Server:
         if not numbers:
             self._waiting.unregister(job.client)
 
-    def _tell(self, job: _Job) -> None:
-        _, status = os.waitpid(job.process, 0)
+    def _look_for_ended(self) -> None:
+        """Tells the clients of all stages that have ended: their signals may have come as one."""
+        os.read(self._ended, 4096)
+        for job in list(self._jobs):
+            process, status = os.waitpid(job.process, os.WNOHANG)
+            if process:
+                self._tell(job, os.waitstatus_to_exitcode(status))
+
+    def _tell(self, job: _Job, code: int) -> None:
         with suppress(KeyError):
             self._waiting.unregister(job.client)
         with suppress(OSError):
-            job.client.sendall(os.waitstatus_to_exitcode(status).to_bytes(2, signed=True))
+            job.client.sendall(code.to_bytes(2, signed=True))
         job.client.close()
-        self._waiting.unregister(job.ended)
-        os.close(job.ended)
-        self._jobs.discard(job.process)
+        self._jobs.discard(job)
 
 
 def _received(client: socket.socket) -> tuple[_Request, list[int]] | None:
@@ -245,10 +256,22 @@ def _become(request: _Request, given: list[int]) -> None:
     sys.argv = request.arguments
 
 
+def _ended_children() -> int:
+    """Makes a descriptor that can be read when a child of this process has ended.
+
+    By the signal, which every kernel and container has: they may lack or refuse pidfd_open(2).
+    """
+    ended, wake = os.pipe()
+    os.set_blocking(wake, False)
+    signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
+    signal.signal(signal.SIGCHLD, lambda *_: None)  # one that is ignored or default wakes nobody
+    return ended
+
+
 def serve(path: Path, listener: int, life: int) -> None:
     """Serves requests at the socket `path`; returns at its end, or its program's in a fork."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    request = _Server(socket.socket(fileno=listener), life).serve()
+    request = _Server(socket.socket(fileno=listener), life, _ended_children()).serve()
     if request is not None:
         runpy.run_module(request.program, run_name="__main__", alter_sys=True)
         return
