@@ -36,6 +36,7 @@ _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 _STREAMS = (0, 1, 2)
 _HANDED_ON = (signal.SIGTERM, signal.SIGINT)
 _LENGTH = 8  # bytes that say how long a request is
+_TAKEN_UP = b"+"  # comes before the exit code, as soon as a stage has a process
 
 
 class _Request(NamedTuple):
@@ -82,7 +83,7 @@ def delegate(program: str, imports: str) -> int | None:
     It imports the module `imports` first, for this stage and those after it.
 
     Returns:
-        The exit code; None where there is no server: the caller does the work.
+        The exit code; None where no server takes the work up: the caller does it.
     """
     streams.complete()
     with socket.socket(socket.AF_UNIX) as server:
@@ -91,16 +92,28 @@ def delegate(program: str, imports: str) -> int | None:
         except (KeyError, OSError):
             return None
         asked = _Request(program, imports, sys.argv, str(Path.cwd()), dict(os.environ))
-        request = json.dumps(asked).encode()
         with _passed_on(server):
-            socket.send_fds(server, [len(request).to_bytes(_LENGTH)], _STREAMS)
-            server.sendall(request)
+            if not _is_taken_up(server, asked):
+                return None
             signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
-            code = server.recv(2, socket.MSG_WAITALL)
+            code = b""
+            with suppress(OSError):  # the server is killed amid the stage, which ends with it
+                code = server.recv(2, socket.MSG_WAITALL)
     status = int.from_bytes(code, signed=True) if len(code) == 2 else -signal.SIGKILL
     if status < 0:
         _end_by(-status)
     return status
+
+
+def _is_taken_up(server: socket.socket, asked: _Request) -> bool:
+    """Hands a request to the server, and tells whether this has a process for it."""
+    request = json.dumps(asked).encode()
+    try:
+        socket.send_fds(server, [len(request).to_bytes(_LENGTH)], _STREAMS)
+        server.sendall(request)
+        return server.recv(len(_TAKEN_UP)) == _TAKEN_UP
+    except OSError:  # the server has gone
+        return False
 
 
 def _end_by(number: int) -> None:
@@ -116,7 +129,8 @@ def _end_by(number: int) -> None:
 def _passed_on(server: socket.socket) -> Iterator[None]:
     """Hands signals on to the stage, which is in a group of its own: each reaches it once.
 
-    They begin blocked: none can come before the request that it belongs to.
+    They begin blocked: none can come before the request that it belongs to, and this process gets
+    itself those that come before somebody takes it up.
     """
 
     def hand_on(number: int, _: object) -> None:
@@ -184,18 +198,23 @@ class _Server:
         request, given = received
         with suppress(Exception):  # the fork meets the same fault, and tells it
             importlib.import_module(request.imports)
-        process = os.fork()
-        if not process:
+        process = _fork()
+        if process == 0:
             self._leave()
             _become(request, given)
             return request
         for stream in given:
             os.close(stream)
-        self._watch(_Job(process, client))
+        if process is None:  # the client sees that nobody takes its work up
+            client.close()
+        else:
+            self._watch(_Job(process, client))
         return None
 
     def _watch(self, job: _Job) -> None:
         self._jobs.add(job)
+        with suppress(OSError):  # a client that has gone is seen to have
+            job.client.sendall(_TAKEN_UP)
         self._wait_for(job.client.fileno(), lambda: self._hand_on(job))
 
     def _leave(self) -> None:
@@ -208,7 +227,9 @@ class _Server:
 
     def _hand_on(self, job: _Job) -> None:
         """Sends the stage the signals that its client got; a client that is gone takes it along."""
-        numbers = job.client.recv(16)
+        numbers = b""
+        with suppress(OSError):  # it is killed before it has read what it was sent
+            numbers = job.client.recv(16)
         for number in numbers or [signal.SIGKILL]:
             os.kill(job.process, number)
         if not numbers:
@@ -237,8 +258,17 @@ def _received(client: socket.socket) -> tuple[_Request, list[int]] | None:
     length = int.from_bytes(head)
     body = client.recv(length, socket.MSG_WAITALL) if length else b""
     if len(given) < len(_STREAMS) or len(body) < length:
+        for stream in given:
+            os.close(stream)
         return None
     return _Request(*json.loads(body)), list(given)
+
+
+def _fork() -> int | None:
+    """Forks as `os.fork` does; None where the machine has no process or no memory left for it."""
+    with suppress(OSError):
+        return os.fork()
+    return None
 
 
 def _become(request: _Request, given: list[int]) -> None:

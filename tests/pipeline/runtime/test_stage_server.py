@@ -47,6 +47,15 @@ for row in [*STAGES.values(), *REPORTS.values()]:
     importlib.import_module(row.module)
 print(len(os.listdir("/proc/self/task")))
 """
+NO_FIRST_FORK = """
+fork = os.fork
+
+def refuse() -> int:
+    os.fork = fork
+    raise BlockingIOError("no process is left")
+
+os.fork = refuse
+"""
 ENVIRONMENT = os.environ | {"COLOUR": "orange", "PYTHONPATH": str(ROOT)}
 
 
@@ -171,10 +180,52 @@ def test_a_stage_may_end_as_its_client_is_signalled() -> None:
     client.sendall(bytes([signal.SIGTERM]))
     os.close(held)
     assert server.serve() is None
-    assert int.from_bytes(client.recv(2), signed=True) == 3
+    assert client.recv(3) == stage_server._TAKEN_UP + (3).to_bytes(2)
     for descriptor in (life, ended, wake):
         os.close(descriptor)
     client.close()
+
+
+@pytest.mark.usefixtures("server")
+@pytest.mark.parametrize("lack", [NO_FIRST_FORK])
+def test_a_stage_that_the_server_has_no_process_for_runs_by_itself(folder: Path) -> None:
+    assert [client(folder, "3").wait(60) for _ in range(2)] == [99, 3]
+
+
+@pytest.mark.parametrize("number", [0, signal.SIGTERM])
+def test_a_client_does_the_work_itself_whose_server_goes_before(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    """What it was signalled meanwhile, it gets itself."""
+    monkeypatch.chdir(folder)
+    monkeypatch.setitem(ENVIRONMENT, stage_server.SOCKET, "stages")
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind("stages")
+        listener.listen()
+        process = client(folder, "0")
+        server, _ = listener.accept()
+        server.recv(1, socket.MSG_PEEK)
+        process.send_signal(number)
+        server.close()
+    assert process.communicate(timeout=60) == ("", "")
+    assert process.returncode == (-number or 99)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="there is no server")
+def test_a_stage_ends_with_a_client_that_has_read_nothing() -> None:
+    life, held = os.pipe()
+    with socket.socket(socket.AF_UNIX) as listener:
+        server = stage_server._Server(listener, life, held)
+        if not (process := os.fork()):
+            signal.pause()
+        ours, client = socket.socketpair()
+        server._watch(job := stage_server._Job(process, ours))
+        client.close()
+        server._hand_on(job)
+        assert os.waitpid(process, 0)[1] == signal.SIGKILL
+        ours.close()
+    os.close(life)
+    os.close(held)
 
 
 def test_a_client_without_a_server_does_the_work_itself(folder: Path) -> None:
