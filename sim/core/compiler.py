@@ -20,6 +20,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TextIO
 
 import platformdirs
 
@@ -87,20 +88,29 @@ def _load(folder: Path, library: Path, asked: list[str]) -> ctypes.CDLL:
         with suppress(OSError):
             return ctypes.CDLL(str(library))
     with compile_time.counted(), library.with_suffix(".lock").open("w") as turn:
-        with suppress(OSError):  # some file systems know no locks: then more than one compile it
-            fcntl.flock(turn, fcntl.LOCK_EX)
+        locks = _locks(turn)
         if _is_whole(library):  # another process has compiled it meanwhile
             with suppress(OSError):
                 return ctypes.CDLL(str(library))
         LOG.info("compiling %s, once on this machine: some seconds", folder.name)
-        for left in library.parent.glob(f"{library.stem}_*"):  # by a process that was killed
-            shutil.rmtree(left, ignore_errors=True)
+        if locks:
+            for left in library.parent.glob(f"{library.stem}_*"):  # by a process that was killed
+                shutil.rmtree(left, ignore_errors=True)
         beside = Path(tempfile.mkdtemp(prefix=f"{library.stem}_", dir=library.parent))
         try:
             _keep(_compiled(folder, beside / library.name, asked), library)
         finally:
             shutil.rmtree(beside, ignore_errors=True)
     return ctypes.CDLL(str(library))
+
+
+def _locks(turn: TextIO) -> bool:
+    """Waits for a file's lock; False where the file system knows none: several may compile then."""
+    try:
+        fcntl.flock(turn, fcntl.LOCK_EX)
+    except OSError:
+        return False
+    return True
 
 
 def _is_whole(library: Path) -> bool:

@@ -1,5 +1,6 @@
 """Compile what is in C once on a machine, and anew after any edit of it."""
 
+import errno
 import os
 import shutil
 import subprocess
@@ -108,6 +109,24 @@ def test_what_a_killed_process_leaves_is_removed(tmp_path: Path) -> None:
     library.unlink()
     assert told(folder, cache) == ("14", True)
     assert not left.exists()
+
+
+def test_what_another_process_compiles_is_left_where_no_lock_tells_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOSYS, "no locks")
+
+    folder, cache = loops(tmp_path), tmp_path / "cache"
+    told(folder, cache)
+    (library,) = cache.rglob("*.so")
+    at_work = library.with_name(f"{library.stem}_other")
+    at_work.mkdir()
+    library.unlink()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
+    monkeypatch.setattr("fcntl.flock", refuse)
+    assert compiler.load(folder).doubled(7) == 14
+    assert at_work.exists()
 
 
 def test_another_compiler_compiles_anew(tmp_path: Path) -> None:
