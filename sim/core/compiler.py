@@ -43,13 +43,19 @@ _SHARED = Path(__file__).parent
 _FULL = "No space left on device", "Disk quota exceeded"
 
 
-class CompilerError(RuntimeError):
-    """Reports that what is in C cannot be compiled."""
+_INSTALL = (
+    "install a compiler: `apt install gcc`, `dnf install gcc`, `xcode-select --install`, or"
+    " `pip install ziglang`; CC names another"
+)
+_NAME_A_FOLDER = "set XDG_CACHE_HOME or TMPDIR to a folder with room, from which code may be run"
 
-    remedy = (
-        "install a compiler: `apt install gcc`, `dnf install gcc`, `xcode-select --install`, or"
-        " `pip install ziglang`; CC names another"
-    )
+
+class CompilerError(RuntimeError):
+    """Reports that what is in C cannot be compiled, and what to do about it."""
+
+    def __init__(self, what: str, remedy: str = _INSTALL) -> None:
+        super().__init__(what)
+        self.remedy = remedy
 
 
 def load(folder: Path, flags: tuple[str, ...] = ()) -> ctypes.CDLL:
@@ -60,6 +66,9 @@ def load(folder: Path, flags: tuple[str, ...] = ()) -> ctypes.CDLL:
     """
     asked = [*options(), *flags]
     name = f"{folder.name}-{_digest(folder, asked)}.so"
+    for place in cache_folders():  # in all before any is tried again that was of no use before
+        if loaded := _loaded(place / name):
+            return loaded
     failures: list[str] = []
     for place in cache_folders():
         try:
@@ -67,7 +76,8 @@ def load(folder: Path, flags: tuple[str, ...] = ()) -> ctypes.CDLL:
             return _load(folder, place / name, asked)
         except OSError as error:  # not to be written, or no code may be run from there
             failures.append(str(error))
-    raise CompilerError(f"what is compiled can be kept nowhere: {'; '.join(failures)}")
+    told = f"what is compiled can be kept nowhere: {'; '.join(failures)}"
+    raise CompilerError(told, _NAME_A_FOLDER)
 
 
 def sources(folder: Path) -> list[Path]:
@@ -83,15 +93,11 @@ def cache_folders() -> Iterator[Path]:
 
 
 def _load(folder: Path, library: Path, asked: list[str]) -> ctypes.CDLL:
-    """Loads a library from its place, where it is compiled if it is not there or is damaged."""
-    if _is_whole(library):
-        with suppress(OSError):
-            return ctypes.CDLL(str(library))
+    """Compiles a library in its place, unless another process does, and loads it."""
     with compile_time.counted(), library.with_suffix(".lock").open("w") as turn:
         locks = _locks(turn)
-        if _is_whole(library):  # another process has compiled it meanwhile
-            with suppress(OSError):
-                return ctypes.CDLL(str(library))
+        if loaded := _loaded(library):  # another process has compiled it meanwhile
+            return loaded
         LOG.info("compiling %s, once on this machine: some seconds", folder.name)
         if locks:
             for left in library.parent.glob(f"{library.stem}_*"):  # by a process that was killed
@@ -111,6 +117,14 @@ def _locks(turn: TextIO) -> bool:
     except OSError:
         return False
     return True
+
+
+def _loaded(library: Path) -> ctypes.CDLL | None:
+    """Loads a library that was compiled before; None where there is none that is whole and runs."""
+    if _is_whole(library):
+        with suppress(OSError):
+            return ctypes.CDLL(str(library))
+    return None
 
 
 def _is_whole(library: Path) -> bool:
@@ -137,8 +151,12 @@ def _compiled(folder: Path, library: Path, asked: list[str]) -> Path:
     if "ziglang" in chosen and can_pin():  # which else compiles for the processor at hand
         asked = [*asked, f"-march={LEVEL.replace('-', '_')}"]
     command = [*chosen, *asked, f"-I{folder.parent}", "-o", str(library), *files, "-lm"]
+    # room is wanted in one folder only, and the words for a lack of it are to be known
+    environment = os.environ | {"TMPDIR": str(library.parent), "LC_ALL": "C"}
     try:
-        ended = subprocess.run(command, capture_output=True, text=True, check=False)
+        ended = subprocess.run(
+            command, capture_output=True, text=True, check=False, env=environment
+        )
     except OSError as error:
         raise CompilerError(f"{chosen[0]} cannot be run: {error.strerror}") from error
     if any(words in ended.stderr for words in _FULL):

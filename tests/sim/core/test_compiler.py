@@ -1,6 +1,8 @@
 """Compile what is in C once on a machine, and anew after any edit of it."""
 
+import ctypes
 import errno
+import logging
 import os
 import shutil
 import subprocess
@@ -175,6 +177,64 @@ def test_a_full_disk_is_left_for_a_folder_for_temporary_files(
     monkeypatch.setenv("CC", str(full))
     assert compiler.load(loops(tmp_path)).doubled(7) == 14
     assert not list((tmp_path / "cache").rglob("*.so"))
+
+
+def test_only_the_folder_of_what_is_compiled_needs_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    full = tmp_path / "full"
+    full.mkdir()
+    program = tmp_path / "program"
+    program.write_text(
+        f'#!/bin/sh\n[ "$TMPDIR $LC_ALL" != "{full} C" ] && exec cc "$@"\n'
+        "echo 'as: No space left on device' >&2; exit 1\n"
+    )
+    program.chmod(0o700)
+    for name, value in {
+        "TMPDIR": full,
+        "XDG_CACHE_HOME": tmp_path / "cache",
+        "CC": program,
+    }.items():
+        monkeypatch.setenv(name, str(value))
+    monkeypatch.setenv("LC_ALL", "C")
+    assert compiler.load(loops(tmp_path)).doubled(7) == 14
+    assert list((tmp_path / "cache").rglob("*.so"))
+
+
+@pytest.fixture
+def no_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Lists folders that no code may be run from: that of caches, at first."""
+    kept = [tmp_path / "cache"]
+    load = ctypes.CDLL
+
+    def refuse(path: str) -> ctypes.CDLL:
+        if any(Path(path).is_relative_to(folder) for folder in kept):
+            raise OSError(f"{path}: failed to map segment from shared object")
+        return load(path)
+
+    monkeypatch.setattr(ctypes, "CDLL", refuse)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(kept[0]))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    return kept
+
+
+@pytest.mark.usefixtures("no_code")
+def test_a_library_for_a_while_is_found_again(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    folder = loops(tmp_path)
+    for compiled in (2, 0):
+        assert compiler.load(folder).doubled(7) == 14
+        assert caplog.text.count("compiling loops") == compiled
+        caplog.clear()
+
+
+def test_a_folder_is_asked_for_where_none_is_of_use(tmp_path: Path, no_code: list[Path]) -> None:
+    no_code.append(tmp_path / TEMPORARY_NAME)
+    with pytest.raises(compiler.CompilerError, match="can be kept nowhere") as refused:
+        compiler.load(loops(tmp_path))
+    assert refused.value.remedy.startswith("set XDG_CACHE_HOME or TMPDIR")
 
 
 def test_faults_of_the_source_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
