@@ -40,13 +40,20 @@ _OF_LEVEL = ("-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mf16c", "-mlzcnt", "-mmovbe
 """The level, as compilers spell it that do not know its name (before gcc 11 and clang 12)."""
 _SHARED = Path(__file__).parent
 """Holds the headers that any library may include, as `sim/core/numbers.h`."""
+_TRIAL = """#include <math.h>
+#include <stdint.h>
+
+int32_t trial(double x) { return (int32_t)sqrt(x); }
+"""
+"""Tells a compiler that works from one without the headers of C, or without its linker."""
 _FULL = "No space left on device", "Disk quota exceeded"
 
 
 _INSTALL = (
-    "install a compiler: `apt install gcc`, `dnf install gcc`, `xcode-select --install`, or"
-    " `pip install ziglang`; CC names another"
+    "install a compiler and the headers of C: `apt install gcc libc6-dev`, `dnf install gcc"
+    " glibc-devel`, `xcode-select --install`, or `pip install ziglang`; CC names another"
 )
+_NAME_A_COMPILER = "set CC to a compiler of C, as `gcc`, or unset it"
 _NAME_A_FOLDER = "set XDG_CACHE_HOME or TMPDIR to a folder with room, from which code may be run"
 
 
@@ -147,10 +154,46 @@ def _keep(made: Path, library: Path) -> None:
 
 def _compiled(folder: Path, library: Path, asked: list[str]) -> Path:
     files = [str(path) for path in sources(folder) if path.suffix == ".c"]
-    chosen = compiler()
-    if "ziglang" in chosen and can_pin():  # which else compiles for the processor at hand
-        asked = [*asked, f"-march={LEVEL.replace('-', '_')}"]
-    command = [*chosen, *asked, f"-I{folder.parent}", "-o", str(library), *files, "-lm"]
+    chosen = compiler(library.parent)
+    if "ziglang" in chosen:  # which else compiles for the processor at hand
+        asked = [*asked, f"-march={LEVEL.replace('-', '_')}" if can_pin() else "-mcpu=baseline"]
+    return _make(library, [*chosen, *asked, f"-I{folder.parent}", *files, "-lm"])
+
+
+def compiler(place: Path) -> list[str]:
+    """Finds a compiler of C: CC, one on the path that works, or the one of the package ziglang.
+
+    Args:
+        place: a folder to try those on the path in.
+
+    Raises:
+        CompilerError: there is none.
+        OSError: the folder is full.
+    """
+    if named := _words_of("CC"):
+        return named
+    (trial := place / "trial.c").write_text(_TRIAL, encoding="ascii")
+    failures: list[str] = []
+    for name in filter(shutil.which, ("cc", "gcc", "clang")):
+        try:
+            _make(trial.with_suffix(".so"), [name, "-shared", "-fPIC", str(trial), "-lm"])
+        except CompilerError as error:
+            failures.append(str(error))
+        else:
+            return [name]
+    if find_spec("ziglang"):
+        return [sys.executable, "-m", "ziglang", "cc"]
+    raise CompilerError("\n".join(failures) or "no compiler of C is found")
+
+
+def _make(library: Path, command: list[str]) -> Path:
+    """Has a compiler make a library.
+
+    Raises:
+        CompilerError: it cannot be run, fails, or makes none.
+        OSError: the library's folder is full.
+    """
+    command = [*command, "-o", str(library)]
     # room is wanted in one folder only, and the words for a lack of it are to be known
     environment = os.environ | {"TMPDIR": str(library.parent), "LC_ALL": "C"}
     try:
@@ -158,29 +201,14 @@ def _compiled(folder: Path, library: Path, asked: list[str]) -> Path:
             command, capture_output=True, text=True, check=False, env=environment
         )
     except OSError as error:
-        raise CompilerError(f"{chosen[0]} cannot be run: {error.strerror}") from error
+        raise CompilerError(f"{command[0]} cannot be run: {error.strerror}") from error
     if any(words in ended.stderr for words in _FULL):
         raise OSError(errno.ENOSPC, f"{library.parent} is full")
     if ended.returncode:
         raise CompilerError(f"{shlex.join(command)}\n{ended.stderr.strip()}")
+    if not library.exists():
+        raise CompilerError(f"{shlex.join(command)}\nmade no library", _NAME_A_COMPILER)
     return library
-
-
-def compiler() -> list[str]:
-    """Finds a compiler of C: CC, one on the path, or the one of the package ziglang.
-
-    Raises:
-        CompilerError: there is none.
-    """
-    named = shlex.split(os.environ.get("CC", ""))
-    if named:
-        return named
-    for name in ("cc", "gcc", "clang"):
-        if shutil.which(name):
-            return [name]
-    if find_spec("ziglang"):
-        return [sys.executable, "-m", "ziglang", "cc"]
-    raise CompilerError("no compiler of C is found")
 
 
 def options() -> list[str]:
@@ -188,8 +216,21 @@ def options() -> list[str]:
     return [
         *_FLAGS,
         *(_OF_LEVEL if can_pin() else ()),
-        *shlex.split(os.environ.get("METACLOAK_CFLAGS", "")),
+        *_words_of("METACLOAK_CFLAGS"),
     ]
+
+
+def _words_of(variable: str) -> list[str]:
+    """Splits what a variable of the environment says into words, as a shell does.
+
+    Raises:
+        CompilerError: a quotation in it has no end.
+    """
+    said = os.environ.get(variable, "")
+    try:
+        return shlex.split(said)
+    except ValueError as error:
+        raise CompilerError(f"{variable} is {said}: {error}", f"mend {variable}") from error
 
 
 def _digest(folder: Path, asked: list[str]) -> str:

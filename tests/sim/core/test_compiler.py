@@ -143,14 +143,69 @@ def test_without_a_compiler_the_remedy_is_told(
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(compiler, "find_spec", lambda _: None)
-    with pytest.raises(compiler.CompilerError, match="no compiler of C is found") as refused:
-        compiler.compiler()
-    assert "apt install gcc" in refused.value.remedy
+    with pytest.raises(compiler.CompilerError, match="no compiler of C is found"):
+        compiler.compiler(tmp_path)
+    without_headers(tmp_path)
+    with pytest.raises(compiler.CompilerError, match=r"math\.h: No such file") as refused:
+        compiler.compiler(tmp_path)
+    assert "apt install gcc libc6-dev" in refused.value.remedy
 
 
-def test_the_compiler_of_the_user_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def without_headers(folder: Path) -> None:
+    """Writes a compiler that lacks the headers of C."""
+    (folder / "cc").write_text("#!/bin/sh\necho 'math.h: No such file' >&2; exit 1\n")
+    (folder / "cc").chmod(0o700)
+
+
+def test_another_is_taken_for_one_that_does_not_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without_headers(tmp_path)
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(compiler, "find_spec", lambda _: True)
+    path = os.environ["PATH"]
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert compiler.compiler(tmp_path) == [sys.executable, "-m", "ziglang", "cc"]
+    monkeypatch.setenv("PATH", f"{tmp_path}:{path}")
+    assert compiler.compiler(tmp_path) == ["gcc"]
+
+
+def test_the_compiler_of_the_user_comes_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("CC", "ccache gcc")
-    assert compiler.compiler() == ["ccache", "gcc"]
+    assert compiler.compiler(tmp_path) == ["ccache", "gcc"]
+
+
+@pytest.mark.parametrize(
+    ("variable", "said", "told"),
+    [
+        ("CC", "'gcc", "CC is 'gcc: No closing quotation"),
+        ("METACLOAK_CFLAGS", '-DX="a', "METACLOAK_CFLAGS is .*: No closing quotation"),
+        ("CC", "true", "true .*made no library"),
+    ],
+)
+def test_what_the_user_says_wrongly_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variable: str, said: str, told: str
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv(variable, said)
+    with pytest.raises(compiler.CompilerError, match=f"(?s){told}") as refused:
+        compiler.load(loops(tmp_path))
+    assert variable in refused.value.remedy
+
+
+@pytest.mark.parametrize(("pins", "flag"), [(True, "-march=x86_64_v3"), (False, "-mcpu=baseline")])
+def test_a_compiler_that_compiles_for_its_processor_is_told_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pins: bool, flag: str
+) -> None:
+    """Processors of several kinds share a folder of caches."""
+    made: list[list[str]] = []
+    monkeypatch.setattr(compiler, "compiler", lambda _: ["python", "-m", "ziglang", "cc"])
+    monkeypatch.setattr(compiler, "can_pin", lambda: pins)
+    monkeypatch.setattr(compiler, "_make", lambda _, command: made.append(command))
+    compiler._compiled(loops(tmp_path), tmp_path / "loops.so", ["-O3"])
+    assert [word for word in made[0] if word.startswith("-m") and word != "-m"] == [flag]
 
 
 def test_a_compiler_that_is_not_there_is_told(

@@ -10,10 +10,12 @@ from sim.core.instruction_set import can_pin
 REPORT = """
 import pipeline
 import subprocess, numpy, scipy.linalg
+from pathlib import Path
 from threadpoolctl import threadpool_info
 from sim.core import compiler
 
-shown = [*compiler.compiler(), *compiler.options(), "-I.", "-S", "-o", "-", "sim/linalg/panels.c"]
+chosen = compiler.compiler(Path(__file__).parent)
+shown = [*chosen, *compiler.options(), "-I.", "-S", "-o", "-", "sim/linalg/panels.c"]
 shown.remove("-shared")
 code = subprocess.run(shown, capture_output=True, text=True, check=True).stdout
 assert "%ymm" in code, "not vectorised at all"
