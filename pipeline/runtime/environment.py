@@ -5,6 +5,7 @@ byte-reproducible without them; work is spread over cores as processes instead. 
 these variables once, when they are imported, so `pipeline` sets them on its own import.
 """
 
+import getpass
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -45,6 +46,7 @@ def pin() -> None:
     if instruction_set.can_pin():
         os.environ.update(instruction_set.LIBRARIES)
         os.environ["XLA_FLAGS"] += f" {instruction_set.XLA_FLAG}"
+    _name_the_user()
     _give_caches_a_home()
     # found by content, so from any checkout
     jax = {"JAX_COMPILATION_CACHE_DIR": str(platformdirs.user_cache_path("metacloak") / "jax")}
@@ -52,17 +54,40 @@ def pin() -> None:
         os.environ.setdefault(name, value)
 
 
+def _name_the_user() -> None:
+    """Names the user by number where the machine knows no name, as in a container: snakemake asks.
+
+    The list of users has no entry for it then; Python 3.13 tells so by another error.
+    """
+    try:
+        getpass.getuser()
+    except (KeyError, OSError):
+        os.environ["LOGNAME"] = str(os.getuid())
+
+
 def _give_caches_a_home() -> None:
     """Names a folder below TMPDIR for all caches of the user, where theirs cannot be written.
 
+    It is also the home of a user who has none, whose caches then lie there.
+
     The machine that submitted this job may have named one, which is not looked for on this one.
     """
-    for name in ("XDG_CACHE_HOME", "JAX_COMPILATION_CACHE_DIR"):
+    for name in ("HOME", "XDG_CACHE_HOME", "JAX_COMPILATION_CACHE_DIR"):
         if TEMPORARY_NAME in Path(os.environ.get(name, "")).parts:
             del os.environ[name]
-    if not _can_be_written(platformdirs.user_cache_path()):
-        with suppress(OSError):
+    with suppress(OSError):
+        if not _has_home():
+            os.environ["HOME"] = str(make_temporary_folder())
+        if not _can_be_written(platformdirs.user_cache_path()):
             os.environ["XDG_CACHE_HOME"] = str(make_temporary_folder())
+
+
+def _has_home() -> bool:
+    try:
+        Path.home()
+    except RuntimeError:
+        return False
+    return True
 
 
 def _can_be_written(folder: Path) -> bool:

@@ -94,7 +94,8 @@ def sources(folder: Path) -> list[Path]:
 
 def cache_folders() -> Iterator[Path]:
     """Lists the folder of what is compiled and, where that cannot be used, one for a while."""
-    yield platformdirs.user_cache_path("metacloak") / "compiled"
+    with suppress(RuntimeError):  # the user has no home
+        yield platformdirs.user_cache_path("metacloak") / "compiled"
     with suppress(OSError):
         yield make_temporary_folder() / "compiled"
 

@@ -12,18 +12,33 @@ from sim.core import TEMPORARY_NAME
 
 TOLD = """
 import os, pipeline
-names = ("XDG_CACHE_HOME", "JAX_COMPILATION_CACHE_DIR")
+names = ("XDG_CACHE_HOME", "JAX_COMPILATION_CACHE_DIR", "LOGNAME", "HOME")
 print(*(os.environ.get(name, "none") for name in names), sep="\\n")
+"""
+
+
+NOBODY = """
+import pwd
+
+def getpwuid(number: int) -> None:
+    raise KeyError(f"getpwuid(): uid not found: {number}")
+
+pwd.getpwuid = getpwuid
 """
 
 
 def caches(home: Path, spare: Path, **named: str) -> list[str]:
     """Tells where a process with this home keeps caches: the user's, and that of JAX."""
-    kept = {"PYTHONPATH": str(ROOT), "HOME": str(home), "TMPDIR": str(spare)}
-    told = subprocess.check_output(
+    return told(spare, HOME=str(home), **named)[:2]
+
+
+def told(spare: Path, **named: str) -> list[str]:
+    """Tells the same of any process, and the name and home of its user."""
+    kept = {"PYTHONPATH": str(ROOT), "TMPDIR": str(spare)}
+    words = subprocess.check_output(
         [sys.executable, "-c", TOLD], env=kept | named, cwd=ROOT, text=True
     )
-    return told.split()
+    return words.split()
 
 
 @pytest.fixture
@@ -54,3 +69,15 @@ def test_what_others_may_have_written_is_no_home_of_caches(spare: Path) -> None:
     (spare / TEMPORARY_NAME).chmod(0o777)
     named = {"XDG_CACHE_HOME": f"{spare / TEMPORARY_NAME}"}
     assert os.fspath(spare) not in " ".join(caches(Path("/proc"), spare, **named))
+
+
+def test_a_user_that_the_machine_does_not_know_has_a_name_and_a_home(
+    tmp_path: Path, spare: Path
+) -> None:
+    """As one of a container that is given a number."""
+    (tmp_path / "sitecustomize.py").write_text(NOBODY)
+    own, path = spare / TEMPORARY_NAME, f"{tmp_path}:{ROOT}"
+    expected = ["none", f"{own}/.cache/metacloak/jax", str(os.getuid()), f"{own}"]
+    assert told(spare, PYTHONPATH=path) == expected
+    assert told(spare, PYTHONPATH=path, HOME=f"/elsewhere/{TEMPORARY_NAME}") == expected
+    assert told(spare, PYTHONPATH=path, LOGNAME="ada", HOME="/")[2:] == ["ada", "/"]
