@@ -14,7 +14,7 @@ import psutil
 
 from pipeline.runtime import INSTALLED, ROOT, RUN_MARK, WORK, UserError, streams
 from pipeline.workflow.rule_inputs import check_problems
-from pipeline.workflow.runs import SNAKEMAKE, Run, stale_jobs, study_lock
+from pipeline.workflow.runs import SNAKEMAKE, Run, stale_jobs, study_lock, write_access
 
 _PATIENCE = 5.0  # seconds that a left-over job gets to end by itself
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
@@ -26,6 +26,7 @@ def work(arguments: list[str]) -> NoReturn:
     os.chdir(WORK)
     check_problems(arguments)
     try:
+        write_access.check(WORK)
         _clear_the_ground()
     except UserError as error:
         sys.exit(f"error: {error}")
