@@ -78,7 +78,9 @@ def own_environment() -> dict[str, str]:
 @pytest.fixture
 def pretended(tmp_path: Path) -> Path:
     """A folder with what sets up, whose environment is of an older lock and only pretends."""
-    (tmp_path / ".venv/bin").mkdir(parents=True)
+    version = ".".join(map(str, sys.version_info[:2]))
+    (tmp_path / f".venv/lib/python{version}/site-packages").mkdir(parents=True)
+    (tmp_path / ".venv/bin").mkdir()
     (tmp_path / ".venv/bin/python").write_text(PRETENDING)
     (tmp_path / ".venv/bin/python").chmod(0o755)
     (tmp_path / ".venv/requirements.lock").write_text("older==1\n")
@@ -285,10 +287,10 @@ def test_an_environment_that_is_there_stays_with_its_python(pretended: Path) -> 
 
 @pytest.mark.parametrize("found", ["its Python", "no Python", "a newer Python"])
 def test_a_python_that_has_gone_is_told(pretended: Path, found: str) -> None:
-    version = "python{}.{}".format(*sys.version_info)
-    packages = pretended / ".venv/lib" / (version if found == "its Python" else "python3.1")
-    (packages / "site-packages").mkdir(parents=True)
     python = pretended / ".venv/bin/python"
+    if found == "a newer Python":
+        (made_by,) = (pretended / ".venv/lib").iterdir()
+        made_by.rename(made_by.with_name("python3.1"))
     if found == "no Python":
         python.unlink()
         python.symlink_to("/not/there/python3.1")
