@@ -62,6 +62,9 @@ def new_document(version: str, size: tuple[float, float]) -> Drawing:
     document.header["$EXTMIN"], document.header["$EXTMAX"] = low, high
     # or ezdxf writes those of the layout over them, unless the lower one is the origin
     document.modelspace().reset_extents(low, high)
+    classes = document.classes
+    classes.add_required_classes(document.dxfversion)  # from a set, whose order differs by process
+    classes.classes = dict(sorted(classes.classes.items()))
     return document
 
 

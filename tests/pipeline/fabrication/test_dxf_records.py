@@ -1,6 +1,9 @@
 """Records of a sheet as ezdxf writes the same curves as entities."""
 
 import io
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any, Literal
 
@@ -32,6 +35,28 @@ def test_records_are_the_bytes_that_ezdxf_writes(
     path = tmp_path / "sheet.dxf"
     drawing_files.write_dxf(SHEET, path, version)
     assert path.read_text(encoding="utf-8") == as_entities(version)
+
+
+WRITER = """
+import sys
+from pipeline.fabrication.files.drawing_files import new_document
+new_document("R2010", (100.0, 60.0)).write(sys.stdout)
+"""
+
+
+def test_a_document_is_the_same_whatever_the_seed_of_hashes() -> None:
+    """Ezdxf lists the classes that a document needs in a set: two seeds that order it otherwise."""
+    written = [
+        subprocess.run(
+            [sys.executable, "-c", WRITER],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            check=True,
+        ).stdout
+        for seed in "05"
+    ]
+    assert written[0] == written[1]
+    assert b"CLASSES" in written[0]
 
 
 def as_entities(version: str) -> str:
