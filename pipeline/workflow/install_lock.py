@@ -112,13 +112,12 @@ def _turn(environment: Path) -> Iterator[None]:
     file = Path(".cache", f"{environment.name}.turn")
     file.parent.mkdir(exist_ok=True)
     with file.open("w") as turn:
-        try:
-            fcntl.flock(turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            _say(f"Waiting for another process, which sets up {environment.name}")
-            fcntl.flock(turn, fcntl.LOCK_EX)
-        except OSError:  # a file system without locks
-            pass
+        with suppress(OSError):  # a file system without locks: none waits for another
+            try:
+                fcntl.flock(turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                _say(f"Waiting for another process, which sets up {environment.name}")
+                fcntl.flock(turn, fcntl.LOCK_EX)
         yield
 
 

@@ -18,7 +18,7 @@ from sim.solvers import LinearRamp, concrete, differentiable_motion
 from sim.structure import ConcreteParameters, Parameters, parameters, parameters_at, shape
 
 Passed: TypeAlias = float | Floats | tuple[Any, ...]
-"""What a map depends on besides: numbers, arrays, and tuples of them."""
+"""Lists the types that a map depends on besides: numbers, arrays, and tuples of them."""
 
 
 class ParameterMap:

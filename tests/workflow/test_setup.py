@@ -139,7 +139,7 @@ def test_a_folder_of_packages_is_enough(folder: Path) -> None:
 def test_uv_is_given_the_settings_of_pip_and_nobody_sees_them(folder: Path) -> None:
     line = wheel(folder / "wheels", "uv", {UV: TELLING})
     (folder / "pip.conf").write_text(
-        f"[global]\nno-index = true\ncert = /of/all\nindex-url = https://{SECRET}@localhost/simple\n"
+        f"[global]\nno-index = true\ncert = /of/all\nindex-url = https://{SECRET}@localhost/packages\n"
         f"[install]\nfind-links =\n    {folder}/wheels\n    /not/there\ncert = {folder}/pip.conf\n"
     )
     ended = set_up(folder, line, offline=False)
@@ -150,7 +150,7 @@ def test_uv_is_given_the_settings_of_pip_and_nobody_sees_them(folder: Path) -> N
     assert words[:4] == ["pip", "install", "--quiet", "--require-hashes"]
     assert "requirements.lock" in words
     wanted = {
-        "UV_DEFAULT_INDEX": f"https://{SECRET}@localhost/simple",
+        "UV_DEFAULT_INDEX": f"https://{SECRET}@localhost/packages",
         "UV_NO_INDEX": "true",
         "UV_FIND_LINKS": f"{folder}/wheels",
         "SSL_CERT_FILE": f"{folder}/pip.conf",

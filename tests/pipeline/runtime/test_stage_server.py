@@ -196,7 +196,7 @@ def test_a_stage_that_the_server_has_no_process_for_runs_by_itself(folder: Path)
 def test_a_client_does_the_work_itself_whose_server_goes_before(
     folder: Path, monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:
-    """What it was signalled meanwhile, it gets itself."""
+    """Gets the signals itself that were sent meanwhile."""
     monkeypatch.chdir(folder)
     monkeypatch.setitem(ENVIRONMENT, stage_server.SOCKET, "stages")
     with socket.socket(socket.AF_UNIX) as listener:

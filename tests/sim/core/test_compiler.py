@@ -102,13 +102,18 @@ def test_a_damaged_file_is_compiled_again(tmp_path: Path, share: float) -> None:
     assert told(folder, cache) == ("14", False)
 
 
-def test_what_a_killed_process_leaves_is_removed(tmp_path: Path) -> None:
-    folder, cache = loops(tmp_path), tmp_path / "cache"
-    told(folder, cache)
-    (library,) = cache.rglob("*.so")
+def folder_beside(library: Path) -> Path:
+    """Makes a folder as of a process that compiles the library, in place of the library."""
     left = library.with_name(f"{library.stem}_left")
     left.mkdir()
     library.unlink()
+    return left
+
+
+def test_what_a_killed_process_leaves_is_removed(tmp_path: Path) -> None:
+    folder, cache = loops(tmp_path), tmp_path / "cache"
+    told(folder, cache)
+    left = folder_beside(*cache.rglob("*.so"))
     assert told(folder, cache) == ("14", True)
     assert not left.exists()
 
@@ -121,10 +126,7 @@ def test_what_another_process_compiles_is_left_where_no_lock_tells_of_it(
 
     folder, cache = loops(tmp_path), tmp_path / "cache"
     told(folder, cache)
-    (library,) = cache.rglob("*.so")
-    at_work = library.with_name(f"{library.stem}_other")
-    at_work.mkdir()
-    library.unlink()
+    at_work = folder_beside(*cache.rglob("*.so"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
     monkeypatch.setattr("fcntl.flock", refuse)
     assert compiler.load(folder).doubled(7) == 14
