@@ -187,8 +187,8 @@ lock: setup
 	sed -i $(ITSELF) requirements.lock
 	$(LOCK) --extra dev --constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
 	sed -i $(ITSELF) requirements-dev.lock
-	$(LOCK) --extra compiler --constraint requirements.lock --output-file requirements-compiler.lock pyproject.toml
-	sed -i $(ITSELF) requirements-compiler.lock
+	$(BIN)/python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']['compiler'], sep='\n')" \
+		| $(LOCK) --output-file requirements-compiler.lock -
 
 clean:
 	rm -rf results .cache .snakemake .hypothesis .mypy_cache .pytest_cache .ruff_cache

@@ -29,7 +29,7 @@ COMMIT_FILE = "COMMIT"
 """Names the commit of sources that were published without their history."""
 SYNTHETIC_LABEL = "SYNTHETIC"
 """Stands wherever data are shown that were computed or rendered, not measured or filmed."""
-PACKAGES = ("jax", "jaxlib", "netCDF4", "numpy", "piqp", "scipy", "shapely", "xarray")
+PACKAGES = ("daqp", "jax", "jaxlib", "netCDF4", "numpy", "scipy", "shapely", "xarray")
 
 
 def of_study(

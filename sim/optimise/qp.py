@@ -1,12 +1,26 @@
-"""The two quadratic programs of a feasible SQP step, by piqp (Schwan et al. 2023)."""
+"""The two quadratic programs of a feasible SQP step, by daqp (Arnström et al. 2022).
 
-from dataclasses import dataclass, replace
+An active-set method ends at a vertex of the active constraints, exact to rounding; daqp is plain C
+without processor-specific code, so the vertex is the same on every x86-64.
+"""
 
+from dataclasses import dataclass
+
+import daqp
 import numpy as np
-import piqp
+import scipy.linalg
 import scipy.sparse as sp
 
 from sim.core import Floats
+
+SOLVED = 1
+"""Exit flag of a minimiser that meets the tolerances."""
+
+TOLERANCE = 1e-10
+"""Violation that a constraint may have, in its own unit per length of its row."""
+
+ITERATIONS = 20
+"""Most iterations, for each variable and constraint: every one enters or leaves a few times."""
 
 
 @dataclass(frozen=True)
@@ -14,7 +28,7 @@ class Quadratic:
     """Solution of a quadratic program."""
 
     step: Floats  # (n,) the minimiser
-    multipliers: Floats  # (m,) of the constraints, >= 0
+    multipliers: Floats  # (m,) of the lower limits, >= 0; of several that coincide, one has all
 
 
 def dense_step(
@@ -31,48 +45,59 @@ def dense_step(
     The solver's tolerances are absolute, for what is minimised in multiples of `unit`. Returns None
     if there is no such d or the solver does not converge.
     """
-    solver = _tuned(piqp.DenseSolver())
-    solver.setup(
-        np.asfortranarray(hessian / unit),
-        gradient / unit,
-        G=np.asfortranarray(matrix.toarray()) if len(least) else None,
-        h_l=least if len(least) else None,
-        x_l=lower,
-        x_u=upper,
-    )
-    found = _solution(solver, len(least))
-    return found and replace(found, multipliers=unit * found.multipliers)
+    # hessian / unit = R' R and z = R d leave |z|^2 / 2 + z.R^-T gradient / unit
+    try:
+        root = scipy.linalg.cholesky(hessian / unit)
+    except np.linalg.LinAlgError:  # rounding has left the model of a steep loss indefinite
+        return None
+    inverse, _ = scipy.linalg.lapack.dtrtri(root)
+    # most of the bounds that hold a step of even curvature hold this one too
+    even = np.clip(gradient / -np.median(np.diag(hessian)), lower, upper)
+    rows = np.vstack([inverse, matrix @ inverse])
+    limits = _limits(least, lower, upper)
+    found = _nearest(inverse.T @ gradient / -unit, rows, *limits, start=root @ even)
+    if found is None:
+        return None
+    step = np.clip(inverse @ found.step, lower, upper)  # which it keeps to rounding
+    return Quadratic(step, unit * found.multipliers[len(step) :])
 
 
 def shortest_step(
     target: Floats, matrix: sp.csr_array, least: Floats, lower: Floats, upper: Floats
 ) -> Quadratic | None:
     """Finds the d closest to ``target`` subject to matrix d >= least and lower <= d <= upper."""
-    solver = _tuned(piqp.SparseSolver())
-    solver.setup(
-        sp.csc_matrix(sp.identity(len(target))),
-        -target,
-        G=sp.csc_matrix(matrix) if len(least) else None,
-        h_l=least if len(least) else None,
-        x_l=lower,
-        x_u=upper,
-    )
-    return _solution(solver, len(least))
-
-
-def _tuned(solver: piqp.DenseSolver | piqp.SparseSolver) -> piqp.DenseSolver | piqp.SparseSolver:
-    solver.settings.eps_abs = 1e-10
-    solver.settings.eps_rel = 1e-10
-    solver.settings.check_duality_gap = False
-    return solver
-
-
-def _solution(solver: piqp.DenseSolver | piqp.SparseSolver, count: int) -> Quadratic | None:
-    if solver.solve() != piqp.PIQP_SOLVED:
+    found = _nearest(target, matrix.toarray(), *_limits(least, lower, upper))
+    if found is None:
         return None
-    found = solver.result
-    multipliers = np.maximum(np.array(found.z_l), 0.0) if count else np.zeros(0)
-    return Quadratic(np.array(found.x), multipliers)
+    step = np.clip(found.step, lower, upper)  # which it keeps to rounding
+    return Quadratic(step, found.multipliers[len(step) :])
+
+
+def _limits(least: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Joins the limits of the variables and of the constraints."""
+    return np.concatenate([lower, least]), np.concatenate([upper, np.full(len(least), np.inf)])
+
+
+def _nearest(
+    target: Floats, matrix: Floats, least: Floats, most: Floats, start: Floats | None = None
+) -> Quadratic | None:
+    """Finds the step closest to ``target`` subject to least <= matrix step <= most.
+
+    Limits that the matrix has no rows for, the first ones, are those of the step itself.
+    """
+    step, _, outcome, more = daqp.solve(
+        np.eye(len(target)),
+        -target,
+        np.ascontiguousarray(matrix),
+        most,
+        least,
+        primal_start=start,
+        primal_tol=TOLERANCE,
+        iter_limit=ITERATIONS * (len(target) + len(least)),
+    )
+    if outcome != SOLVED:
+        return None
+    return Quadratic(np.array(step), np.maximum(-np.array(more["lam"]), 0.0))
 
 
 def reachable(values: Floats, jacobian: sp.csr_array, reach: float) -> np.ndarray:

@@ -38,8 +38,8 @@ FLOORS = {
     "reports": ({"base"}, {"study"}, {"panels", "facts"}, {"page"}, {"figures"}, {"products"}),
 }
 HEAVY = {
-    "av", "cv2", "diffrax", "ezdxf", "jax", "lxml", "manifold3d", "matplotlib", "netCDF4",
-    "numpy", "pandas", "pint", "piqp", "reportlab", "scipy", "shapely", "snakemake", "svgelements",
+    "av", "cv2", "daqp", "diffrax", "ezdxf", "jax", "lxml", "manifold3d", "matplotlib", "netCDF4",
+    "numpy", "pandas", "pint", "reportlab", "scipy", "shapely", "snakemake", "svgelements",
     "tqdm", "trimesh", "xarray", "xml",
 }  # fmt: skip
 LIGHT = HEAVY - {"lxml", "numpy", "scipy", "snakemake", "tqdm", "xml"}
