@@ -65,12 +65,24 @@ def dense_step(
 def shortest_step(
     target: Floats, matrix: sp.csr_array, least: Floats, lower: Floats, upper: Floats
 ) -> Quadratic | None:
-    """Finds the d closest to ``target`` subject to matrix d >= least and lower <= d <= upper."""
-    found = _nearest(target, matrix.toarray(), *_limits(least, lower, upper))
-    if found is None:
-        return None
-    step = np.clip(found.step, lower, upper)  # which it keeps to rounding
-    return Quadratic(step, found.multipliers[len(step) :])
+    """Finds the d closest to ``target`` subject to matrix d >= least and lower <= d <= upper.
+
+    Constraints are local and few of them hold the step: those that the step without them misses
+    are added until none is missed, so that a program is as large as what is near its solution.
+    """
+    step = np.clip(target, lower, upper)
+    multipliers, added = np.zeros(len(least)), np.zeros(len(least), dtype=bool)
+    while (missed := (matrix @ step < least - TOLERANCE) & ~added).any():
+        added |= missed
+        rows = matrix[added]
+        moved = np.unique(rows.indices)
+        limits = _limits(least[added], lower[moved], upper[moved])
+        found = _nearest(target[moved], rows[:, moved].toarray(), *limits, start=step[moved])
+        if found is None:
+            return None
+        step[moved] = np.clip(found.step, lower[moved], upper[moved])  # kept to rounding
+        multipliers[added] = found.multipliers[len(moved) :]
+    return Quadratic(step, multipliers)
 
 
 def _limits(least: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:

@@ -11,14 +11,13 @@ import yaml
 
 from pipeline.posing import UNSTABLE, design_hash
 from pipeline.runtime import ROOT
+from sim.core.instruction_set import can_pin
 from tests.e2e import stages
 from tests.e2e.stages import Built, build, build_verification
 
 EXPECTED = yaml.safe_load((ROOT / "tests/data/studies.yaml").read_text())
 TOLERANCE = 0.1
 """Part by which a loss may exceed that expected."""
-PINNED_ON = "AMD EPYC"
-"""Processor of the expected hashes: on others piqp rounds otherwise, by their caches."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class Expected:
     """Losses of a study: of the structure that is altered, and of the design shipped.
 
     `shorter` is that of the design shipped with a quarter of the time step, of a motion in time;
-    `design` is its hash on the processor PINNED_ON. On its path it snaps at most
+    `design` is its hash at the pinned level of instructions. On its path it snaps at most
     `snaps` times, and no more than `overlaps` pairs of units overlap, null if any may.
     """
 
@@ -77,5 +76,5 @@ def test_a_study_reaches_its_losses(target: str, tmp_path: Path) -> None:
         by_step = build_verification(*study)["loss"].sel(structure="cloaked")
         assert float(by_step.isel(check=2)) == pytest.approx(float(by_step.isel(check=0)), rel=1e-3)
         assert float(by_step.isel(check=2)) <= expected.shorter * (1 + TOLERANCE)
-    if expected.design is not None and PINNED_ON in Path("/proc/cpuinfo").read_text():
+    if expected.design is not None and can_pin():
         assert design_hash(built.design) == expected.design
