@@ -23,6 +23,6 @@ _KNOWN = prose(__file__)
 OPTIONS: dict[str, dict[str, Any]] = {
     f"--{name}": {"type": Path} | settings for name, settings in _KNOWN["options"].items()
 }
-"""What argparse knows of every option."""
+"""Settings of every option, as argparse takes them."""
 
 REPORTS = {kind: ReportCommand(**command) for kind, command in _KNOWN["reports"].items()}

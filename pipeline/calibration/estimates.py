@@ -20,7 +20,7 @@ CONVERGED = 0.05
 _MANY = 1e6
 """Freedom from which Student's distribution is the normal one."""
 DERIVED: tuple[ConstantName, ...] = ("damping_translation", "damping_rotation")
-"""What follows from a damping ratio by the authors' law."""
+"""Constants that follow from a damping ratio by the authors' law."""
 
 
 class Estimate(NamedTuple):

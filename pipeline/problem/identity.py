@@ -10,7 +10,7 @@ from pipeline.problem.model import SWITCHES, Problem
 from pipeline.runtime import STAGES
 
 REPORT = "report"
-"""What depends on all of a problem: the pages."""
+"""The stage that depends on all of a problem: the pages."""
 
 _SLOTS: dict[str, Any] = {
     **dict.fromkeys(("minimum_wall", "minimum_gap", "fillet_radius", "slots"), True),

@@ -32,7 +32,7 @@ LOG = logging.getLogger(__name__)
 Table = dict[str, list[CaseResult]]
 
 FINER = (2, 10)
-"""How many times more load steps the loss is checked with."""
+"""Factors of the number of load steps that the loss is checked with."""
 
 
 def work(args: argparse.Namespace) -> None:

@@ -15,4 +15,4 @@ Singles: TypeAlias = NDArray[np.float32]
 Reals: TypeAlias = NDArray[np.floating[Any]]
 Image: TypeAlias = NDArray[np.uint8]
 Numbers: TypeAlias = "Array | Floats"
-"""What a JAX function takes; it returns ``Array``."""
+"""Argument of a JAX function; it returns ``Array``."""

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 _spent = 0.0
 _since: list[float] = []
-"""When each compilation began that is under way: one within another."""
+"""Start times (s) of the compilations under way, one within another."""
 
 
 @contextmanager

@@ -20,7 +20,7 @@ ELASTIC: tuple[ConstantName, ...] = (
     "bending_stiffness",
     "contact_cutoff",
 )
-"""What equilibria depend on."""
+"""Constants that equilibria depend on."""
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from sim.time_integration import ImplicitSolver, time_grid
 AnySolver = StaticSolver | ImplicitSolver
 
 Seen = Callable[[Numbers, Parameters], Array]
-"""What is measured of a motion (n_times, n_units, 3) of given parameters."""
+"""Readings of a motion (n_times, n_units, 3) of given parameters."""
 
 
 def _of_numbers(

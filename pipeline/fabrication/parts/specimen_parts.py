@@ -30,7 +30,7 @@ SHIM_PLAY = 0.1
 """Most that a shim may be shorter than from slot end to slot end, mm."""
 
 LETTERS = "ABCDEFGHJKLMNPRSTUVXY4"
-"""What small units carry instead of their ids; none looks like another one that is turned."""
+"""Engraved on small units in place of ids; none looks like another one that is turned."""
 
 Strokes = tuple[Floats, ...]
 """Open polylines (n, 2)."""

@@ -9,7 +9,7 @@ from pipeline.tracking.geometry import Depth, SpecimenOutlines
 from sim.core import Floats, Singles
 
 _MOVED = 0.04
-"""How far a back may move against its face before its silhouette is drawn again, px."""
+"""Movement of a back against its face from which its silhouette is drawn again, px."""
 
 
 class SideWalls:

@@ -22,7 +22,7 @@ _GAPS = (0, 1, 2, 3, 4, 5, 6, 8, 10)
 _VISIBLE = 2.5
 """Steps must be so many standard uncertainties long on either side of a gap."""
 _ROUGH = 3.0
-"""What is left of smooth motion, over a standard uncertainty, where a gap may be the reason."""
+"""Residual of smooth motion, in standard uncertainties, that a gap may be the reason of."""
 _SMOOTH = 20.0
 """The same where the gap is allowed for, at most: what is rougher is a jolt."""
 _EVEN = 0.2

@@ -11,7 +11,7 @@ PREFIX = "cloak_"
 """Begins the names of all jobs of a run; see profiles/slurm."""
 
 LOGS = Path(".snakemake/slurm_logs")
-"""Where jobs on a cluster write, in the folder of their run: without it, there was none."""
+"""Logs of jobs on a cluster, in the folder of their run: without it, there was none."""
 
 _PATIENCE = 60.0  # seconds that cancelled jobs get to end
 _FORMAT = "%i|%j|%Z"  # number, name, working directory

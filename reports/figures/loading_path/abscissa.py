@@ -28,7 +28,7 @@ ORDER = ("intact", "altered", "cloaked")
 _ALONG = np.cos(np.pi / 4)
 """Of a drive: nearer to the line than to its normal it strains along it, else it shears."""
 SECOND = "Cloaked, no overlap"
-"""What a figure calls the design for contact on distance."""
+"""Label of the design for contact on distance."""
 
 
 @dataclass(frozen=True)

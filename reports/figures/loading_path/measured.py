@@ -23,7 +23,7 @@ Under = tuple[str, str]
 """Ends of a fact's key and of its label that tell the load case."""
 
 _NAMES = {"rotation": "mean_rotation", "mismatch": "mimicking_error", "contraction": "contraction"}
-"""What comparisons follow, by the key of the report's measure."""
+"""Quantities that comparisons follow, by the key of the report's measure."""
 _ENDS = ("low", "high")
 _SIDES = ("measured", "simulated")
 _CASE = ("case", "under")
