@@ -25,9 +25,10 @@ _LINES_PER_JOB = 10
 class Progress:
     """Counts the steps of a job and tells about them, with figures such as loss and violation.
 
-    A resumed job has done `initial` steps before. A bar is drawn, by default, on a terminal if
-    `pipeline.runtime.cli` may talk to it. The clock, in seconds, by default stands still while
-    loops are compiled.
+    A resumed job has done `initial` steps before. Where more steps come than were expected, as of a
+    video that holds more frames than it tells, their number is the total. A bar is drawn, by
+    default, on a terminal if `pipeline.runtime.cli` may talk to it. The clock, in seconds, by
+    default stands still while loops are compiled.
     """
 
     def __init__(
@@ -60,8 +61,10 @@ class Progress:
     def update(self, steps: int = 1, **figures: float | str) -> None:
         """Count `steps` more and tell of them if it is time; `figures` are shown behind."""
         self._done += steps
+        self._total = max(self._total, self._done)
         told = {name: x if isinstance(x, str) else f"{x:.4g}" for name, x in figures.items()}
         if self._bar is not None:
+            self._bar.total = self._total
             self._bar.set_postfix(told, refresh=False)
             self._bar.update(steps)
         now, share = self._clock(), self._share()

@@ -16,7 +16,6 @@ from pipeline.tracking.frames.frame_times import (
     BARE,
     FrameClock,
     goes_on,
-    promised_count,
     stream_length,
 )
 from pipeline.tracking.frames.picture_folder import pictures, read_folder
@@ -95,7 +94,9 @@ def frame_count(path: Path) -> int:
     try:
         with open_video(path) as container:
             stream = container.streams.video[0]
-            return max(1, round(promised_count(container, stream, float(stream.average_rate or 0))))
+            length = stream_length(container, stream, None)
+            rate = float(stream.average_rate or 0.0) if math.isfinite(length) else 0.0
+            return max(1, stream.frames or round(rate * length if rate else 0.0))
     except (av.FFmpegError, FileNotFoundError, IndexError):
         return 1
 

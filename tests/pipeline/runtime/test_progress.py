@@ -61,6 +61,16 @@ def test_a_bar_is_drawn_on_request(capsys: pytest.CaptureFixture[str]) -> None:
     assert "drawn" in capsys.readouterr().err
 
 
+def test_no_more_steps_are_done_than_there_are(
+    lines: Callable[[], list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for bar in (False, True):
+        with Progress(8, "frames", bar=bar) as progress:
+            progress.update(9)
+    assert lines()[0].startswith("frames: 9/9,")
+    assert "9/9" in capsys.readouterr().err
+
+
 @given(steps=st.lists(st.integers(0, 30), max_size=30), total=st.integers(0, 100))
 def test_any_steps_are_taken(steps: list[int], total: int) -> None:
     ticks: Iterator[float] = iter(float(tick) for tick in range(10_000))
