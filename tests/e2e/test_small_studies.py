@@ -28,7 +28,7 @@ class Small:
 SPARED = Small(
     "fig4",
     start=1.0698091452,
-    end=0.016897638978,
+    end=0.016836639755,
     changes=yaml.safe_load("""
 lattice: { columns: 5, rows: 5 }
 drive: { amplitude: 4 mm }

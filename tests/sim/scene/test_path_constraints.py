@@ -28,10 +28,9 @@ def scene(share: float | None, foil: FoilLimit | None = None) -> sim.Scene:
 @cache
 def best_design(share: float | None) -> Result:
     """The best of some evaluations; with a share of the eigenvalue to keep, it does not snap."""
-    evaluations = 25 if share is None else 9
-    return sim.minimise(
-        scene(share), LIMITS, options=sim.SqpOptions(evaluations=evaluations, retreats=0)
-    )
+    evaluations, radius = (25, 0.15) if share is None else (9, 0.25)
+    options = sim.SqpOptions(evaluations=evaluations, radius=radius, retreats=0)
+    return sim.minimise(scene(share), LIMITS, options=options)
 
 
 def margins(posed: sim.Scene) -> PathConstraints:
