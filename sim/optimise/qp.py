@@ -1,7 +1,7 @@
 """The two quadratic programs of a feasible SQP step, by daqp (Arnström et al. 2022).
 
-An active-set method ends at a vertex of the active constraints, exact to rounding; daqp is plain C
-without processor-specific code, so the vertex is the same on every x86-64.
+An active-set method ends in the minimiser itself, to rounding, where an interior one comes near it;
+daqp is plain C without code for one processor or another, so its steps are those of any x86-64.
 """
 
 from dataclasses import dataclass

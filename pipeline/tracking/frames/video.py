@@ -95,8 +95,8 @@ def frame_count(path: Path) -> int:
         with open_video(path) as container:
             stream = container.streams.video[0]
             length = stream_length(container, stream, None)
-            rate = float(stream.average_rate or 0.0) if math.isfinite(length) else 0.0
-            return max(1, stream.frames or round(rate * length if rate else 0.0))
+            shown = float(stream.average_rate or 0.0) * length if math.isfinite(length) else 0.0
+            return max(1, stream.frames or round(shown))
     except (av.FFmpegError, FileNotFoundError, IndexError):
         return 1
 

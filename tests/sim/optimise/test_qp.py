@@ -65,7 +65,7 @@ def test_the_shortest_step_is_the_nearest(seed: int, size: int) -> None:
 
 
 def test_a_tiny_step_is_the_shortest() -> None:
-    """What a projection has to mend is often a ten-millionth of a millimetre."""
+    """Projections often mend a ten-millionth of a millimetre."""
     along = np.array([3.0, 4.0])
     wide = np.full(2, 1.0)
     found = shortest_step(np.zeros(2), sp.csr_array(along[None]), np.array([5e-7]), -wide, wide)
