@@ -5,6 +5,7 @@ its running sum along the rows is the picture. It is linear, so polygons that li
 carry the difference of their shades, and all go into one buffer.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,12 +24,25 @@ class NestedPolygons(NamedTuple):
     shade: Floats
 
 
+def mean_polygons(pictures: Sequence[NestedPolygons]) -> NestedPolygons:
+    """Joins the polygons of several pictures to those of their mean."""
+    points, start, shade = zip(*pictures, strict=True)
+    before = np.cumsum([0, *map(len, points[:-1])])
+    starts = [one[:-1] + place for one, place in zip(start, before, strict=True)]
+    joined = np.concatenate(points)
+    return NestedPolygons(
+        joined,
+        np.concatenate([*starts, [len(joined)]]),
+        np.concatenate(shade) / len(pictures),
+    )
+
+
 def coverage_image(rings: NestedPolygons, shape: tuple[int, int]) -> Floats:
     """Averages the shade (rows, columns) over each pixel; pixel (0, 0) reaches from -0.5 to 0.5."""
     change = np.zeros((shape[0], shape[1] + 2))
     points = np.ascontiguousarray(rings.points + 0.5)
     _accumulate(points, rings.start, rings.shade, change, change.shape[1])
-    return np.cumsum(change, axis=1)[:, : shape[1]]
+    return np.cumsum(change, axis=1, out=change)[:, : shape[1]]
 
 
 @compiled

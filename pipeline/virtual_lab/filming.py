@@ -1,6 +1,7 @@
 """Films a response: frames from shades to bytes, and the exact truth of what they show."""
 
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from typing import NamedTuple
 
 import cv2
@@ -12,7 +13,7 @@ from pipeline.problem.sections import Lighting, VirtualRecording
 from pipeline.runtime import UserError
 from pipeline.tracking.geometry import outlines_of_design
 from pipeline.virtual_lab.camera_pose import Viewpoint, viewpoint
-from pipeline.virtual_lab.coverage import coverage_image
+from pipeline.virtual_lab.coverage import coverage_image, mean_polygons
 from pipeline.virtual_lab.face_marks import draw_marks
 from pipeline.virtual_lab.film_scene import FilmScene, nested_polygons
 from pipeline.virtual_lab.filmed_motion import FilmedMotion, sample_motion
@@ -135,26 +136,31 @@ def sensor_frame(
 
     The exposure averages `instants` (instants, units, 3); the noise of each frame is its own.
     """
-    shades = np.mean([shade_image(scene, pose, asked.sensor.blur) for pose in instants], axis=0)
+    shades = shade_image(scene, instants, asked.sensor.blur)
     light = _light(asked.light, shades.shape)
     flicker = 1 + asked.light.flicker * np.sin(2 * np.pi * _MAINS * time)
     return _noisy(np.clip(shades, 0, 1) * light * flicker, index, asked)
 
 
-def shade_image(scene: FilmScene, pose: Floats, blur: float) -> Floats:
-    """Renders the shade (rows, columns) of pixels behind the optics, without light and noise."""
+def shade_image(scene: FilmScene, instants: Floats, blur: float) -> Floats:
+    """Renders the shade (rows, columns) of pixels behind the optics, without light and noise.
+
+    Coverage and blur are linear, so the mean of `instants` (instants, units, 3) is blurred once.
+    """
     columns, rows = scene.view.camera.size
-    rings = nested_polygons(scene, pose)
+    rings = mean_polygons([nested_polygons(scene, pose) for pose in instants])
     fine = rings._replace(points=(rings.points + 0.5) * FINER - 0.5)
-    picture = scene.look.board + coverage_image(fine, (rows * FINER, columns * FINER))
+    picture = coverage_image(fine, (rows * FINER, columns * FINER))
+    picture += scene.look.board
     if blur > 0:
         edge = cv2.BORDER_REPLICATE
-        picture = np.asarray(
-            cv2.GaussianBlur(picture, (0, 0), blur * FINER, borderType=edge), float
-        )
-    return picture.reshape(rows, FINER, columns, FINER).mean(axis=(1, 3))
+        blurred = cv2.GaussianBlur(picture, (0, 0), blur * FINER, borderType=edge)
+        picture = np.asarray(blurred, float)
+    in_columns = picture.reshape(rows, FINER, -1).sum(axis=1)
+    return in_columns.reshape(rows, columns, FINER).sum(axis=2) / FINER**2
 
 
+@lru_cache(maxsize=1)
 def _light(asked: Lighting, shape: tuple[int, ...]) -> Floats:
     """Brightness (rows, columns) of white."""
     rows, columns = shape

@@ -13,6 +13,7 @@ import platform
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -237,4 +238,8 @@ def _has_uv(pip: Sequence[str], lock: Path) -> bool:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except KeyboardInterrupt:
+        _say("stopped: the same command goes on")
+        sys.exit(128 + signal.SIGINT)

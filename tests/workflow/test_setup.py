@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -102,6 +103,7 @@ def start(folder: Path, *words: str, **variables: str) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        start_new_session=True,
     )
 
 
@@ -180,6 +182,21 @@ def test_of_two_at_once_one_sets_up_and_the_other_waits(pretended: Path) -> None
     assert [each.returncode for each in both] == [0, 0], told
     assert installed(pretended) == ["requirements.lock", "requirements-dev.lock"]
     assert "Nothing to be done" in start(pretended, "dev").communicate()[0]
+
+
+def test_an_interrupt_ends_it_with_one_line(pretended: Path) -> None:
+    turn = pretended / ".cache/.venv.turn"
+    turn.parent.mkdir()
+    with turn.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        waiting = start(pretended, "setup")
+        assert waiting.stderr
+        assert "Waiting for another process" in waiting.stderr.readline()
+        os.killpg(waiting.pid, signal.SIGINT)
+        told = waiting.communicate()[1]
+    assert waiting.returncode
+    assert "Traceback" not in told
+    assert "stopped: the same command goes on" in told
 
 
 def test_a_lock_of_the_same_content_is_not_installed_again(pretended: Path) -> None:

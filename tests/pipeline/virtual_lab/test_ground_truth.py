@@ -73,7 +73,7 @@ def test_the_picture_is_true_to_a_fraction_of_a_hundredth_of_a_pixel() -> None:
     look = UnitAppearance.model_validate({"face": 0.6, "mark": 0.0, "side": 0.3, "board": 1.0})
     scene = one_unit(look)
     pose = np.array([0.37, -0.21, 0.5])
-    made, exact = filming.shade_image(scene, pose[None], 0.0), sampled(scene, pose)
+    made, exact = filming.shade_image(scene, pose[None, None], 0.0), sampled(scene, pose)
     assert np.isclose(exact, look.side).sum() > 20  # the walls are seen
     assert len(scene.marks.unit) == 2
     slope = np.gradient(made)
@@ -86,7 +86,7 @@ def test_the_picture_is_true_to_a_fraction_of_a_hundredth_of_a_pixel() -> None:
 def test_blur_does_not_move_anything() -> None:
     """Blurred on a grid three times as fine, or nine times: the same picture."""
     scene = one_unit(UnitAppearance())
-    pose = np.array([[0.1, 0.2, -0.3]])
+    pose = np.array([[[0.1, 0.2, -0.3]]])
     made = filming.shade_image(scene, pose, 0.5)
     usual, filming.FINER = filming.FINER, 9
     try:
@@ -96,6 +96,15 @@ def test_blur_does_not_move_anything() -> None:
     slope = np.gradient(made)
     for axis in (0, 1):
         assert abs((slope[axis] * (finer - made)).sum() / (slope[axis] ** 2).sum()) < 0.002
+
+
+def test_an_exposure_is_the_mean_of_its_instants() -> None:
+    scene = one_unit(UnitAppearance())
+    poses = np.array([[[0.1, 0.2, -0.3]], [[0.6, 0.1, -0.2]], [[1.1, 0.0, -0.1]]])
+    alone = [filming.shade_image(scene, pose[None], 0.5) for pose in poses]
+    exposed = filming.shade_image(scene, poses, 0.5)
+    np.testing.assert_allclose(exposed, np.mean(alone, axis=0), atol=1e-12)
+    assert np.abs(alone[0] - alone[2]).max() > 0.1
 
 
 def test_noise_is_that_of_the_electrons(film: VirtualFilm) -> None:
