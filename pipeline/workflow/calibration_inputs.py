@@ -4,11 +4,13 @@ A calibration is a file experiments/calibration/NAME.yaml. It names measured fil
 tells how they are computed.
 """
 
+from __future__ import annotations
+
 from pathlib import Path
 
 from snakemake.iocontainers import Wildcards
 
-from pipeline.calibration.inputs import Calibration, source_files
+from pipeline.calibration import inputs
 from pipeline.problem.fields import named_files
 from pipeline.problem.reading import load_section
 from pipeline.runtime import WORK, UserError
@@ -37,7 +39,7 @@ def named_by(wildcards: Wildcards) -> dict[str, str]:
     if asked is None:
         return {}
     try:
-        found = source_files(asked, Path(_FOLDER))
+        found = inputs.source_files(asked, Path(_FOLDER))
     except UserError:  # of a problem, of which the stage will tell
         found = named_files(asked, Path(_FOLDER))
     return {key.replace(".", "_"): file.as_posix() for key, file in found.items()}
@@ -55,9 +57,9 @@ def measured_files(folder: str, pattern: str = "*.csv", root: Path = WORK) -> li
     return sorted(path.relative_to(root).as_posix() for path in found)
 
 
-def _described(source: str) -> Calibration | None:
+def _described(source: str) -> inputs.Calibration | None:
     """Reads the calibration; None where it cannot be read, of which the stage will tell why."""
     try:
-        return load_section(WORK / source, Calibration)
+        return load_section(WORK / source, inputs.Calibration)
     except UserError:
         return None

@@ -10,8 +10,6 @@ from pipeline.calibration.inputs.population import SampleTest
 from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.problem.fields import csv_columns, named_files
 
-"""Stands above the numbers of a CSV that was computed, or is of a rendered video."""
-
 
 def source_files(asked: Calibration, folder: Path) -> dict[str, Path]:
     """Lists the files that a calibration in a folder names, and those of its tracks' problems.
