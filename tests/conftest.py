@@ -27,7 +27,7 @@ settings.register_profile(
 )
 settings.load_profile("suite")
 
-LARGE, GROWTH = 850 << 20, 150 << 20
+LARGE, GROWTH = 700 << 20, 150 << 20
 """Bytes from which a process drops what JAX has compiled, and by which it has to grow till then."""
 _process, _kept = psutil.Process(), [0]
 _frozen = [0]  # objects: a stage that is imported keeps all that there is, garbage too
