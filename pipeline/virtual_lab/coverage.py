@@ -26,14 +26,11 @@ class NestedPolygons(NamedTuple):
 
 def mean_polygons(pictures: Sequence[NestedPolygons]) -> NestedPolygons:
     """Joins the polygons of several pictures to those of their mean."""
-    points, start, shade = zip(*pictures, strict=True)
-    before = np.cumsum([0, *map(len, points[:-1])])
-    starts = [one[:-1] + place for one, place in zip(start, before, strict=True)]
-    joined = np.concatenate(points)
+    sizes = np.concatenate([np.diff(one.start) for one in pictures])
     return NestedPolygons(
-        joined,
-        np.concatenate([*starts, [len(joined)]]),
-        np.concatenate(shade) / len(pictures),
+        np.concatenate([one.points for one in pictures]),
+        np.concatenate([[0], np.cumsum(sizes)]),
+        np.concatenate([one.shade for one in pictures]) / len(pictures),
     )
 
 
