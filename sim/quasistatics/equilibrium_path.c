@@ -13,6 +13,8 @@
 static const double CLOSE = 1e-6;
 /* Limits of the next increment over the last. */
 static const double SHORTER = 0.25, LONGER = 4.0;
+/* Increment with which a path goes on after a snap, of the way to the load. */
+static const double RESTART = 1e-3;
 /* Correction of a known step at most, over its length. */
 static const double SHORT = 0.2;
 /* Eigenvalue over the first state's up to which a path has ended: beyond, the residual's tolerance
@@ -34,31 +36,50 @@ static void note(double *snaps, double place) {
     }
 }
 
+static const Outlook CLEAR = {INFINITY, 0, 0.0, {INFINITY, 1.0, NULL}};
+
+static void fail(Outlook *outlook, double place) {
+    outlook->wall = place, outlook->limit.distance = INFINITY;
+    outlook->failures++;
+}
+
+static void pass(Outlook *outlook, double place, double gone) {
+    outlook->length = gone;
+    if (place < outlook->wall) return;
+    outlook->wall = outlook->limit.distance = INFINITY;
+    outlook->failures = 0;
+}
+
 typedef struct { double done, ended; int kind; } Advance;
 
 /* Follows the path to one load; the workspace holds a factor of the tangent before and after. */
 static Advance advance(
     double *motion, double *load, int64_t number, bool leaves, double sense, double *pace, double *mode,
-    double *predicted, const Tolerance *t, const System *s, const Workspace *w, double *snaps,
+    double *predicted, double *bend, const Tolerance *t, const System *s, const Workspace *w, double *snaps,
     int64_t *counts) {
     increments_aim(motion, load, 1.0, s, w);
     double way = length_of(w->product, s->held, s->n_held, s);
     Advance a = {0.0, NAN, SMOOTH};
+    Outlook outlook = CLEAR;
+    outlook.limit.bend = bend;
     while (a.done < 1.0 && !met_new_units(s)) {
         counts[INCREMENTS]++;
-        double ahead = increments_next(pace[INCREMENT], 1.0 - a.done, way, pace);
+        double ahead = increments_next(pace[INCREMENT], a.done, way, pace, &outlook);
         double share = ahead / (1.0 - a.done);
-        double gone = ahead * increments_step_ahead(motion, load, share, predicted, s, w, counts);
+        double gone = ahead * increments_step_ahead(
+            motion, load, share, ahead, &outlook.limit, predicted, s, w, counts);
         if (!(gone >= least(SMALLEST_INCREMENT, ahead))) {
             copy(motion, w->saved, s->n_mass);  /* held units drive a void into its barrier */
             break;
         }
         bool last = share == 1.0 && gone == ahead;
         bool smooth = settle(motion, t, s, w, counts);
-        double crooked = smooth ? increments_crookedness(motion, predicted, s, w) : INFINITY;
+        double crooked = INFINITY;
+        if (smooth) crooked = increments_crookedness(motion, predicted, gone, &outlook, s, w);
         double change = least(LONGER, most(SHORTER, 0.9 / sqrt(most(crooked, 1e-300))));
         if (crooked <= 1.0) {
             a.done = last ? 1.0 : a.done + gone;
+            pass(&outlook, a.done, gone);
             double value = snap_lowest_mode(s, w, mode, SWEEPS, 0.0);
             pace[RATE] = (square(value) - square(pace[VALUE])) / most(gone * way, 1e-300);
             pace[VALUE] = value;
@@ -66,6 +87,7 @@ static Advance advance(
             if (value > SINGULAR * pace[FIRST] || a.done == 1.0) continue;
         } else {
             copy(motion, w->saved, s->n_mass);
+            fail(&outlook, a.done + gone);
             pace[INCREMENT] = least(change, 0.9) * gone;
             if (newton_factorise_shifted(motion, s, w, counts) < 0.0) break;
             if (pace[INCREMENT] >= SMALLEST_INCREMENT) continue;
@@ -85,7 +107,8 @@ static Advance advance(
             note(snaps, number + a.done);
         }
         a.done = share == 1.0 ? 1.0 : a.done + share * (1.0 - a.done);
-        pace[INCREMENT] = CLOSE, pace[RATE] = 0.0;
+        outlook = CLEAR, outlook.limit.bend = bend;
+        pace[INCREMENT] = RESTART, pace[RATE] = 0.0;
         pace[VALUE] = snap_lowest_mode(s, w, mode, SWEEPS, 0.0);
     }
     return a;
@@ -135,8 +158,8 @@ void equilibrium_path_follow(
     double *drag, const Branch *branch, int64_t *counts, int64_t n_loads, double *returned) {
     Tolerance tolerance = {relative, absolute, drag}, *t = &tolerance;
     int64_t n = s->n_mass, p = known;
-    double *motion = calloc(2 * n + s->n_dofs, sizeof(double));
-    double *step = motion + n, *mode = step + n;
+    double *motion = calloc(3 * n + s->n_dofs, sizeof(double));
+    double *step = motion + n, *bend = step + n, *mode = bend + n;
     returned[0] = returned[1] = 0.0;
     if (begin(motion, mode, sense, known, pace, branch, t, s, w, counts) < 0.0 && known == 0) {
         free(motion);
@@ -154,7 +177,7 @@ void equilibrium_path_follow(
         }
         if (done < 1.0) {
             Advance a = advance(
-                motion, load, p, leaves, sense, pace, mode, step, t, s, w, branch->snaps, counts);
+                motion, load, p, leaves, sense, pace, mode, step, bend, t, s, w, branch->snaps, counts);
             done = a.done;
             if (branch->jumped[p] == SMOOTH) branch->jumped[p] = a.kind;
             /* that of coming to rest stays where the way is smooth */

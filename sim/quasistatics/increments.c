@@ -1,15 +1,20 @@
 /* Moves along an equilibrium path by one increment: its length, its steps, its departure. */
 #include "sim/quasistatics/quasistatics.h"
 
-/* Departure of a smooth increment from the trapezoidal rule at most, over its length and in mm. */
-static const double CROOKED = 0.05, CROOKED_LENGTH = 1e-5;
+/* Departure of a smooth increment from the trapezoidal rule at most, over its length and in mm, and
+   the part of it by which a limit point is noticed. */
+static const double CROOKED = 0.05, CROOKED_LENGTH = 1e-5, NOTICED = 0.01;
 /* Newton steps at most by which an increment goes on where the barrier cuts its first step. */
 enum { STEPS_AHEAD = 6 };
 /* Part of the way to where the eigenvalue is expected to vanish that an increment goes at most: of a
-   stiff structure, and of a soft one, as more of the path to a limit point is too crooked. */
+   stiff structure, and of a soft one that no limit point is in sight of, as more is too crooked. */
 static const double STIFF_PART = 0.75, SOFT_PART = 0.5;
 /* Eigenvalue over the first state's up to which a structure is soft. */
 static const double SOFT = 0.5;
+/* Failures to pass a wall from which on it is approached with care: up to a part of the way to the
+   limit point that is in sight, and to it only by half of the way there or by steps known to do. */
+enum { STUBBORN = 3 };
+static const double LIMIT_PART = 0.75, WALL_PART = 0.5;
 
 void increments_tangent_step(double *motion, const System *s, const Workspace *w) {
     /* K_ff du_f = -K_fh du_h */
@@ -24,24 +29,39 @@ void increments_aim(double *motion, double *load, double share, const System *s,
     EACH(i, s->n_held) w->product[s->held[i]] = (load[i] - motion[s->held[i]]) * share;
 }
 
-/* Compares the way from `saved` with the trapezoidal rule; 1 is the most there may be. */
-double increments_crookedness(double *motion, double *predicted, const System *s, const Workspace *w) {
+/* Compares the way from `saved` with the trapezoidal rule, fitted to the limit point that is in
+   sight; 1 is the most there may be. Locates one behind a wall. */
+double increments_crookedness(
+    double *motion, double *predicted, double gone, Outlook *outlook, const System *s,
+    const Workspace *w) {
     memset(w->product, 0, sizeof(double) * s->n_mass);
     EACH(i, s->n_held) w->product[s->held[i]] = motion[s->held[i]] - w->saved[s->held[i]];
     increments_tangent_step(motion, s, w);
-    /* u1 - u0 = (t0 + t1) / 2 */
+    LimitPoint *limit = &outlook->limit;
+    double r = limit_point_ratio(limit, gone);
     EACH(d, s->n_mass) w->trial[d] = motion[d] - w->saved[d];
-    EACH(d, s->n_mass) w->product[d] = w->trial[d] - 0.5 * (predicted[d] + w->step[d]);
-    double limit = most(CROOKED * length_of(w->trial, s->dofs, s->n_dofs, s), CROOKED_LENGTH);
-    return length_of(w->product, s->dofs, s->n_dofs, s) / limit;
+    EACH(d, s->n_mass) w->product[d] = w->trial[d] - (predicted[d] + r * w->step[d]) / (1.0 + r);
+    double allowed = most(CROOKED * length_of(w->trial, s->dofs, s->n_dofs, s), CROOKED_LENGTH);
+    if (outlook->failures >= STUBBORN)
+        limit_point_locate(predicted, gone, NOTICED * allowed, limit, s, w);
+    return length_of(w->product, s->dofs, s->n_dofs, s) / allowed;
 }
 
-double increments_next(double increment, double left, double way, const double *pace) {
-    if (pace[RATE] >= 0.0) return least(increment, left);
+/* Length of the next increment: at most `increment`, and what the outlook and the eigenvalue allow. */
+double increments_next(
+    double increment, double done, double way, const double *pace, const Outlook *outlook) {
+    double next = least(increment, 1.0 - done);
+    if (outlook->failures >= STUBBORN) {
+        next = least(next, most(LIMIT_PART * outlook->limit.distance, SMALLEST_INCREMENT));
+        double careful = most(outlook->length, WALL_PART * (outlook->wall - done));
+        if (done + next >= outlook->wall) next = least(next, most(careful, SMALLEST_INCREMENT));
+    }
+    if (pace[RATE] >= 0.0) return next;
     /* lambda^2 falls linearly towards a limit point, and faster than that towards a branching */
     double expected = square(pace[VALUE]) / (-pace[RATE] * way);
-    double part = pace[VALUE] < SOFT * pace[FIRST] ? SOFT_PART : STIFF_PART;
-    return least(least(increment, left), most(part * expected, SMALLEST_INCREMENT));
+    bool blind = pace[VALUE] < SOFT * pace[FIRST] && !isfinite(outlook->limit.distance);
+    double part = blind ? SOFT_PART : STIFF_PART;
+    return least(next, most(part * expected, SMALLEST_INCREMENT));
 }
 
 static void newton_ahead(double *motion, const System *s, const Workspace *w) {
@@ -57,12 +77,13 @@ static void newton_ahead(double *motion, const System *s, const Workspace *w) {
 
 /* Moves by a share of the way to a load short of the barrier; returns the part of it gone. */
 double increments_step_ahead(
-    double *motion, double *load, double share, double *predicted, const System *s,
-    const Workspace *w, int64_t *counts) {
+    double *motion, double *load, double share, double ahead, const LimitPoint *limit,
+    double *predicted, const System *s, const Workspace *w, int64_t *counts) {
     copy(w->saved, motion, s->n_mass);
     increments_aim(motion, load, share, s, w);
     increments_tangent_step(motion, s, w);
     copy(predicted, w->step, s->n_mass);
+    limit_point_bend(limit, ahead, w->step, s);
     double gone = least(1.0, KEEP_FROM_BARRIER * total_admissible_step(motion, s, w->step));
     EACH(d, s->n_mass) motion[d] += gone * w->step[d];
     EACH(tries, STEPS_AHEAD) {

@@ -49,6 +49,21 @@ typedef struct {
     double energy, residual, reaction;
 } Balance;
 
+/* A limit point ahead, as the last increment told of it. Lengths are parts of the way to a load. */
+typedef struct {
+    double distance; /* infinite if none is in sight */
+    double ratio;    /* of the root of the distance to that before the increment */
+    double *bend;    /* growth of the tangent's step over the increment */
+} LimitPoint;
+
+/* What increments that failed, and those that did not, tell of the way ahead. */
+typedef struct {
+    double wall;   /* place that one failed to pass last, infinite once it is passed */
+    int failures;  /* of increments since a wall was passed */
+    double length; /* of the last one that did not fail */
+    LimitPoint limit;
+} Outlook;
+
 Balance newton_balance_of(double *motion, const System *s, const Workspace *w);
 double newton_median_stiffness(const System *s);
 double newton_factorise_shifted(
@@ -68,11 +83,19 @@ void increments_tangent_step(double *motion, const System *s, const Workspace *w
 void increments_aim(
     double *motion, double *load, double share, const System *s, const Workspace *w);
 double increments_crookedness(
-    double *motion, double *predicted, const System *s, const Workspace *w);
-double increments_next(double increment, double left, double way, const double *pace);
+    double *motion, double *predicted, double gone, Outlook *outlook, const System *s,
+    const Workspace *w);
+double increments_next(
+    double increment, double done, double way, const double *pace, const Outlook *outlook);
 double increments_step_ahead(
-    double *motion, double *load, double share, double *predicted, const System *s,
-    const Workspace *w, int64_t *counts);
+    double *motion, double *load, double share, double ahead, const LimitPoint *limit,
+    double *predicted, const System *s, const Workspace *w, int64_t *counts);
+
+double limit_point_ratio(const LimitPoint *limit, double gone);
+void limit_point_locate(
+    double *predicted, double gone, double noticed, LimitPoint *limit, const System *s,
+    const Workspace *w);
+void limit_point_bend(const LimitPoint *limit, double ahead, double *step, const System *s);
 
 void path_ends_scatter(double *mode, int64_t n);
 double path_ends_leave(

@@ -20,7 +20,7 @@ static const double FIRST_STEP = 1.0;
 /* Limit of the next step over the last, the factor by which that comes back after 1 at a rejection,
    and the factor on a rejected step at most: while the structure leaves a critical point, the
    longest step for which the system is positive definite shrinks. */
-static const double LONGER = 5.0, LONGER_AGAIN = 1.5, TOO_LONG = 0.5;
+static const double LONGER = 25.0, LONGER_AGAIN = 1.5, TOO_LONG = 0.5;
 enum { MAX_STEPS = 5000 };
 /* Largest movement by which a critical point is left along its mode, mm. */
 static const double PUSH = 1e-2;
@@ -65,34 +65,52 @@ static double largest_of(double *step, const System *s) {
     return largest;
 }
 
-/* Fills `product` with a step of the damped motion, `guess` with its difference from first order. */
-static bool ros2(
-    double *motion, double *drag, double h, const System *s, const Workspace *w, int64_t *counts) {
-    const double gamma = 1.0 + sqrt(0.5);
-    double energy[2];
-    counts[FACTORS]++;
-    symmetric_clear(&w->matrix);
-    total_tangent(motion, s, &w->kinematics, &w->matrix);
-    EACH(i, s->n_dofs) symmetric_add(&w->matrix, i, i, drag[s->dofs[i]] / (gamma * h));
-    if (!symmetric_factorise(&w->matrix)) return false;
-    /* (K + C / (gamma h)) d1 = -g(q) / gamma */
-    newton_solve_free(s, w);
-    EACH(d, s->n_mass) w->product[d] = w->step[d] / gamma;
-    EACH(d, s->n_mass) w->trial[d] = motion[d] + w->product[d];
-    if (KEEP_FROM_BARRIER * total_admissible_step(motion, s, w->product) < 1.0) {
-        total_gradient(motion, s, &w->kinematics, w->force, energy);
-        return false;
-    }
-    total_gradient(w->trial, s, &w->kinematics, w->force, energy);
-    /* (K + C / (gamma h)) d2 = -g(q + d1) / gamma - 2 C d1 / (gamma h) */
+/* Solves (K + 2 C / h) u = -g + share C / h v, with g in `force`, v in `guess` and u in `step`. */
+static void solve_stage(double share, double *drag, double h, const System *s, const Workspace *w) {
     EACH(i, s->n_dofs) {
         int64_t d = s->dofs[i];
-        w->force[d] = (w->force[d] + 2.0 * drag[d] * w->product[d] / h) / gamma;
+        w->force[d] -= share * drag[d] / h * w->guess[d];
     }
     newton_solve_free(s, w);
-    EACH(d, s->n_mass) w->guess[d] = 0.5 * (w->product[d] + w->step[d]);
-    EACH(d, s->n_mass) w->product[d] = w->product[d] + w->guess[d];
+}
+
+/* Finds the gradient beyond `product` in `force`; false if the barrier is in the way. */
+static bool look_ahead(double *motion, const System *s, const Workspace *w) {
+    double energy[2];
+    if (KEEP_FROM_BARRIER * total_admissible_step(motion, s, w->product) < 1.0) return false;
+    EACH(d, s->n_mass) w->trial[d] = motion[d] + w->product[d];
+    total_gradient(w->trial, s, &w->kinematics, w->force, energy);
+    return true;
+}
+
+/* Fills `product` with a step of the damped motion by RODAS3, `guess` with its difference from
+   second order (Sandu et al., Atmospheric Environment 31, 3459, 1997). */
+static bool rodas3(
+    double *motion, double *drag, double h, const System *s, const Workspace *w, int64_t *counts) {
+    double energy[2];
+    counts[FACTORS]++;
     total_gradient(motion, s, &w->kinematics, w->force, energy);
+    symmetric_clear(&w->matrix);
+    total_tangent(motion, s, &w->kinematics, &w->matrix);
+    EACH(i, s->n_dofs) symmetric_add(&w->matrix, i, i, 2.0 * drag[s->dofs[i]] / h);
+    if (!symmetric_factorise(&w->matrix)) return false;
+    /* (K + 2 C / h) u1 = -g(q) */
+    newton_solve_free(s, w);
+    EACH(d, s->n_mass) w->product[d] = 2.0 * w->step[d];
+    copy(w->guess, w->step, s->n_mass);
+    /* (K + 2 C / h) u2 = -g(q) + 4 C / h u1 */
+    solve_stage(4.0, drag, h, s, w);
+    EACH(d, s->n_mass) w->guess[d] -= w->step[d];
+    /* (K + 2 C / h) u3 = -g(q + 2 u1) + C / h (u1 - u2) */
+    if (!look_ahead(motion, s, w)) return false;
+    solve_stage(1.0, drag, h, s, w);
+    EACH(d, s->n_mass) w->product[d] += w->step[d];
+    EACH(d, s->n_mass) w->guess[d] -= 8.0 / 3.0 * w->step[d];
+    /* (K + 2 C / h) u4 = -g(q + 2 u1 + u3) + C / h (u1 - u2 - 8/3 u3) */
+    if (!look_ahead(motion, s, w)) return false;
+    solve_stage(1.0, drag, h, s, w);
+    EACH(d, s->n_mass) w->product[d] += w->step[d];
+    copy(w->guess, w->step, s->n_mass);
     return true;
 }
 
@@ -104,17 +122,16 @@ bool snap_follow_to_rest(double *motion, const Tolerance *t, const System *s, co
     h = FIRST_STEP * h / newton_median_stiffness(s);
     double near = AT_REST, fastest = 0.0, growth = LONGER;
     int steps = 0;
-    total_gradient(motion, s, &w->kinematics, w->force, energy);
     EACH(tries, MAX_STEPS) {
         if (met_new_units(s)) return false;  /* no step is short enough */
-        if (!ros2(motion, drag, h, s, w, counts)) {
+        if (!rodas3(motion, drag, h, s, w, counts)) {
             h *= TOO_LONG;
             growth = 1.0;
             continue;
         }
         double error = largest_of(w->guess, s), moved = largest_of(w->product, s);
         double allowed = KEEP_FROM_BARRIER * total_admissible_step(motion, s, w->product);
-        double longer = 0.8 * sqrt(FLOW_ERROR / most(error, 1e-300));
+        double longer = 0.8 * cbrt(FLOW_ERROR / most(error, 1e-300));
         if (error > FLOW_ERROR || allowed < 1.0) {
             h *= least(TOO_LONG, most(0.2, longer));
             growth = 1.0;
@@ -124,11 +141,11 @@ bool snap_follow_to_rest(double *motion, const Tolerance *t, const System *s, co
         h *= least(growth, longer);
         growth = least(LONGER, LONGER_AGAIN * growth);
         EACH(d, s->n_mass) motion[d] += w->product[d];
-        total_gradient(motion, s, &w->kinematics, w->force, energy);
         steps++;
         fastest = most(fastest, speed);
         if (moved >= AT_REST || (speed > SLOWER * fastest && steps < PATIENCE)) continue;
         fastest = speed, steps = 0;
+        total_gradient(motion, s, &w->kinematics, w->force, energy);
         if (newton_factorise_tangent(motion, s, w, 0.0, counts)) {
             newton_solve_free(s, w);
             if (largest_of(w->step, s) < near) {
@@ -137,7 +154,6 @@ bool snap_follow_to_rest(double *motion, const Tolerance *t, const System *s, co
                 if (newton_correct(motion, t, false, s, w, counts))
                     return newton_factorise_tangent(motion, s, w, 0.0, counts);
                 copy(motion, w->guess, s->n_mass);
-                total_gradient(motion, s, &w->kinematics, w->force, energy);
                 near *= CLOSER;
             }
         }

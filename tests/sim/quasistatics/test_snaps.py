@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 from sim.core import Floats
 from sim.energy import Topology, gradient, system_of, workspace
 from sim.quasistatics import BRANCHING, LIMIT_POINT, StaticSolver
+from sim.quasistatics.newton import FACTORS
 from sim.solvers import LinearRamp, TimeSeries
 from sim.structure import ConcreteParameters, quads
 from sim.vibration import linearised
@@ -109,6 +110,14 @@ def test_the_end_of_a_path_with_snaps_does_not_depend_on_its_loads(seed: int, sn
         np.testing.assert_allclose(
             other.snapped[other.jumped > 0], first.snapped[first.jumped > 0], rtol=0, atol=1e-7
         )
+
+
+@pytest.mark.parametrize(("seed", "most"), [(19, 250), (27, 400), (31, 450)])
+def test_a_snap_is_found_and_left_by_few_factorisations(seed: int, most: int) -> None:
+    """By halving the way to a limit point, and by motion of order 2, they were 282, 594, 756."""
+    rig, values = crumpled(seed)
+    solver = StaticSolver(rig.topology, np.arange(1, 11) / 10)
+    assert solver.forward(values, rig.drive)[2].counts[FACTORS] < most
 
 
 def test_a_path_that_is_not_left_ends_where_the_structure_snaps() -> None:
