@@ -2,9 +2,9 @@
 
    Between two output loads the increment adapts itself. An increment is smooth if no tangent on the
    way or at its end was indefinite and the motion is that of the trapezoidal rule; one that is not
-   is cut, and none is longer than the smallest eigenvalue of the tangent lets expect, so that the
-   path is followed up to where it ends: a limit point or a branching. From there it goes on in the
-   state that damped motion comes to, and the critical point is recorded. */
+   is cut, and none is longer than the smallest eigenvalue of the tangent and the growth of its steps
+   let expect, so that the path is followed up to where it ends: a limit point or a branching. From
+   there it goes on in the state that damped motion comes to, and the critical point is recorded. */
 #include "sim/quasistatics/quasistatics.h"
 
 #include <stdlib.h>
