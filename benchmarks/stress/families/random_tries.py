@@ -225,8 +225,10 @@ def _traced(case: StressScene, loads: Floats) -> Sequence[Check]:
         before = int(np.flatnonzero(stable <= load)[-1])
         start = float(path.loads[before]), path.states[before]
         near = trace(case.topology, case.values, case.drive, start, float(load), 60, SHORT)
-        share = (load - near.loads[-2]) / (near.loads[-1] - near.loads[-2])
-        between = near.states[-2] + share * (near.states[-1] - near.states[-2])
-        off = np.abs((between - state) * case.topology.scale).max()
+        # nearest on the last piece of it: by the load it would be far off where that turns back
+        ends = near.states[-2:] * case.topology.scale
+        along, ahead = ends[1] - ends[0], state * case.topology.scale - ends[0]
+        share = np.clip(along @ ahead / (along @ along), 0.0, 1.0)
+        off = np.abs(share * along - ahead).max()
         checks.append(Check("state off the traced path, mm", float(off), 0.05))
     return checks
