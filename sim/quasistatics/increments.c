@@ -11,8 +11,8 @@ enum { STEPS_AHEAD = 6 };
 static const double STIFF_PART = 0.75, SOFT_PART = 0.5;
 /* Eigenvalue over the first state's up to which a structure is soft. */
 static const double SOFT = 0.5;
-/* Failures to pass a wall from which on it is approached with care: up to a part of the way to the
-   limit point that is in sight, and to it only by half of the way there or by steps known to do. */
+/* Failures to pass a wall from which on increments take care: they go a part of the way to the limit
+   point in sight; one that would pass the wall goes half of the way to it, or as far as the last. */
 enum { STUBBORN = 3 };
 static const double LIMIT_PART = 0.75, WALL_PART = 0.5;
 
