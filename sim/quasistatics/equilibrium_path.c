@@ -36,7 +36,7 @@ static void note(double *snaps, double place) {
     }
 }
 
-static const Outlook CLEAR = {INFINITY, 0, 0.0, {INFINITY, 1.0, NULL}};
+static Outlook clear(double *bend) { return (Outlook){INFINITY, 0, 0.0, {INFINITY, 1.0, bend}}; }
 
 static void fail(Outlook *outlook, double place) {
     outlook->wall = place, outlook->limit.distance = INFINITY;
@@ -60,8 +60,7 @@ static Advance advance(
     increments_aim(motion, load, 1.0, s, w);
     double way = length_of(w->product, s->held, s->n_held, s);
     Advance a = {0.0, NAN, SMOOTH};
-    Outlook outlook = CLEAR;
-    outlook.limit.bend = bend;
+    Outlook outlook = clear(bend);
     while (a.done < 1.0 && !met_new_units(s)) {
         counts[INCREMENTS]++;
         double ahead = increments_next(pace[INCREMENT], a.done, way, pace, &outlook);
@@ -107,7 +106,7 @@ static Advance advance(
             note(snaps, number + a.done);
         }
         a.done = share == 1.0 ? 1.0 : a.done + share * (1.0 - a.done);
-        outlook = CLEAR, outlook.limit.bend = bend;
+        outlook = clear(bend);
         pace[INCREMENT] = RESTART, pace[RATE] = 0.0;
         pace[VALUE] = snap_lowest_mode(s, w, mode, SWEEPS, 0.0);
     }

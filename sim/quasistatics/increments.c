@@ -37,6 +37,7 @@ double increments_crookedness(
     memset(w->product, 0, sizeof(double) * s->n_mass);
     EACH(i, s->n_held) w->product[s->held[i]] = motion[s->held[i]] - w->saved[s->held[i]];
     increments_tangent_step(motion, s, w);
+    /* u1 - u0 = (t0 + r t1) / (1 + r) */
     LimitPoint *limit = &outlook->limit;
     double r = limit_point_ratio(limit, gone);
     EACH(d, s->n_mass) w->trial[d] = motion[d] - w->saved[d];
