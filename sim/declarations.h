@@ -92,6 +92,8 @@ typedef struct {
     int64_t n_child;
     int64_t *children;
     int64_t n_children;
+    int64_t *apart;
+    int64_t n_apart;
     int64_t *panel;
     int64_t n_panel;
     int64_t *update;
@@ -120,6 +122,7 @@ typedef struct {
     double *scratch;
     int64_t n_scratch;
     Pattern pattern;
+    int64_t threads;
 } Matrix;
 
 typedef struct {

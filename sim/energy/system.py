@@ -56,13 +56,13 @@ def kinematics_of(system: System) -> Kinematics:
     return Kinematics(np.empty((len(system.mass) // 3, 4)), np.empty(len(system.net.unit)))
 
 
-def workspace(system: System) -> Workspace:
-    """Allocates scratch arrays that fit a system."""
+def workspace(system: System, threads: int = 1) -> Workspace:
+    """Allocates scratch arrays that fit a system, whose tangent that many threads factorise."""
     force, step, product, trial, saved, guess = np.empty((6, len(system.mass)))
     right = np.empty(len(system.dofs))
     return Workspace(
         kinematics_of(system), force, step, product, trial, saved, guess, right,
-        matrix(system.pattern),
+        matrix(system.pattern, threads),
     )  # fmt: skip
 
 

@@ -19,7 +19,8 @@ void panels_solve(
     const double *values, const Panels *panels, int64_t n, double *right, double *scratch);
 
 int64_t multifrontal_entry(const Fronts *fronts, int64_t row, int64_t column);
-bool multifrontal_factorise(double *values, double *scratch, const Fronts *fronts);
+bool multifrontal_factorise(
+    double *values, double *scratch, const Fronts *fronts, int64_t threads);
 void multifrontal_solve(const double *factor, const Fronts *fronts, int64_t n, double *right);
 
 #endif

@@ -3,6 +3,8 @@
 #include "sim/linalg/linalg.h"
 
 #include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -37,23 +39,65 @@ static void add_child(
     }
 }
 
-bool multifrontal_factorise(double *values, double *scratch, const Fronts *f) {
+/* Factorises one front with what its children left; false if it is not positive definite. */
+static bool eliminate(int64_t front, double *values, double *scratch, const Fronts *f) {
     double plus = 1.0, minus = -1.0;
-    for (int64_t front = 0; front < f->n_update; front++) {
-        int64_t k = f->first[front + 1] - f->first[front], b = f->edge[front + 1] - f->edge[front];
-        double *panel = values + f->panel[front], *block = scratch + f->update[front];
-        memset(block, 0, sizeof(double) * b * b);
-        for (int64_t c = f->child[front]; c < f->child[front + 1]; c++)
-            add_child(f->children[c], k, b, panel, block, scratch, f);
-        int own = k, rest = b, whole = k + b, info = 0;
-        lapack_dpotrf("L", &own, panel, &whole, &info);
-        if (info != 0 || !isfinite(panel[(k - 1) * (k + b) + k - 1])) return false;
-        if (b == 0) continue;
-        double *below = panel + k;
-        lapack_dtrsm("R", "L", "T", "N", &rest, &own, &plus, panel, &whole, below, &whole);
-        lapack_dsyrk("L", "N", &rest, &own, &minus, below, &whole, &plus, block, &rest);
-    }
+    int64_t k = f->first[front + 1] - f->first[front], b = f->edge[front + 1] - f->edge[front];
+    double *panel = values + f->panel[front], *block = scratch + f->update[front];
+    for (int64_t j = 0; j < b; j++) memset(block + j * b + j, 0, sizeof(double) * (b - j));
+    for (int64_t c = f->child[front]; c < f->child[front + 1]; c++)
+        add_child(f->children[c], k, b, panel, block, scratch, f);
+    int own = k, rest = b, whole = k + b, info = 0;
+    lapack_dpotrf("L", &own, panel, &whole, &info);
+    if (info != 0 || !isfinite(panel[(k - 1) * (k + b) + k - 1])) return false;
+    if (b == 0) return true;
+    double *below = panel + k;
+    lapack_dtrsm("R", "L", "T", "N", &rest, &own, &plus, panel, &whole, below, &whole);
+    lapack_dsyrk("L", "N", &rest, &own, &minus, below, &whole, &plus, block, &rest);
     return true;
+}
+
+/* A run of fronts that ends with one whose children are in it, and the threads for them. */
+typedef struct {
+    int64_t first, last, threads;
+    double *values, *scratch;
+    const Fronts *f;
+    atomic_bool *indefinite; /* found by any thread: the others need not go on */
+} Run;
+
+static void *factorise_run(void *given) {
+    const Run *run = given;
+    const Fronts *f = run->f;
+    int64_t next = run->first, child = f->child[run->last], end = f->child[run->last + 1];
+    if (run->threads > 1 && f->apart[run->last]) {
+        Run one = *run, other = *run;
+        one.last = f->children[child], one.threads = run->threads / 2;
+        other.threads = run->threads - one.threads;
+        pthread_t helper;
+        bool helped = !pthread_create(&helper, NULL, factorise_run, &one);
+        if (!helped) factorise_run(&one);
+        while (++child < end) {
+            other.first = f->children[child - 1] + 1, other.last = f->children[child];
+            factorise_run(&other);
+        }
+        if (helped) pthread_join(helper, NULL);
+        next = run->last;
+    }
+    for (; next <= run->last && !*run->indefinite; next++)
+        if (!eliminate(next, run->values, run->scratch, f)) *run->indefinite = true;
+    return NULL;
+}
+
+/* Factorises by that many threads; by any number the factor has the same bits. */
+bool multifrontal_factorise(double *values, double *scratch, const Fronts *f, int64_t threads) {
+    atomic_bool indefinite = false;
+    Run run = {0, 0, threads, values, scratch, f, &indefinite};
+    for (; run.last < f->n_update; run.last++)
+        if (f->edge[run.last] == f->edge[run.last + 1]) { /* it has no parent */
+            factorise_run(&run);
+            run.first = run.last + 1;
+        }
+    return !indefinite;
 }
 
 void multifrontal_solve(const double *values, const Fronts *f, int64_t n, double *right) {

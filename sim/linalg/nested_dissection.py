@@ -5,6 +5,7 @@ come after those of both sides. Each cut, and each part too small to be cut, is 
 are eliminated together as one dense block, coupled to later dofs, the front's boundary.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,12 @@ from sim.core import Floats, Ints
 
 SMALLEST_PART = 8
 """Units that are no longer cut: smaller fronts cost more in calls than they save in fill."""
+
+
+MOST_APART = 2
+"""Generations of fronts, from the last one down, whose children may be factorised side by side."""
+LEAST_APART = 1 << 18
+"""Numbers of the factor, of a front and all below it, from which that gains more than it costs."""
 
 
 class Fronts(NamedTuple):
@@ -27,6 +34,9 @@ class Fronts(NamedTuple):
     place: Ints
     child: Ints  # (n_fronts + 1,) where a front's part of ``children`` starts
     children: Ints  # fronts by parent
+    # (n_fronts,) whether threads may factorise side by side what is below each child: runs of
+    # fronts that end with one child after another, with scratch memory of their own
+    apart: Ints
     panel: Ints  # (n_fronts + 1,) where a front's own columns start among the factor's values
     update: Ints  # (n_fronts,) where its boundary's block starts in the scratch memory
     owner: Ints  # (n,) front that eliminates each dof
@@ -36,7 +46,7 @@ class Fronts(NamedTuple):
 def no_fronts() -> Fronts:
     """Returns the fronts of nothing."""
     start, none = np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    return Fronts(start, start, none, none, start, none, start, none, none, start)
+    return Fronts(start, start, none, none, start, none, none, start, none, none, start)
 
 
 def dissect(
@@ -125,7 +135,9 @@ def fronts_of(own: list[Ints], boundaries: list[Ints], n_dofs: Ints) -> Fronts:
     n_children = np.bincount(parent[parent >= 0], minlength=len(own))
     heights = np.array([len(row) for row in rows])
     columns = np.diff(first)
-    update, scratch = _scratch(heights**2, parent)
+    panel = _starts(columns * (columns + heights))
+    apart = _apart(parent, panel)
+    update, scratch = _scratch(heights**2, parent, apart)
     return Fronts(
         first=first,
         edge=_starts(heights),
@@ -133,7 +145,8 @@ def fronts_of(own: list[Ints], boundaries: list[Ints], n_dofs: Ints) -> Fronts:
         place=np.concatenate(place),
         child=_starts(n_children),
         children=children,
-        panel=_starts(columns * (columns + heights)),
+        apart=apart,
+        panel=panel,
         update=update,
         owner=owner,
         scratch=np.array([scratch]),
@@ -149,16 +162,63 @@ def _place(row: Ints, first: int, end: int, boundary: Ints) -> Ints:
     return np.where(row < end, row - first, end - first + np.searchsorted(boundary, row))
 
 
-def _scratch(sizes: Ints, parent: Ints) -> tuple[Ints, int]:
-    """Places each front's block while it waits for its parent; returns starts and total size."""
-    start = np.zeros(len(sizes), dtype=np.int64)
+def _apart(parent: Ints, panel: Ints) -> Ints:
+    """Chooses fronts whose children may be factorised side by side, from the last ones down.
+
+    A front that waits for one further up may lie between those below another, where units are
+    missing: then there are no runs.
+    """
+    n = len(parent)
+    below: list[list[int]] = [
+        [] for _ in range(n + 1)
+    ]  # the last of these, of those without parent
+    lowest = np.arange(n + 1)
+    for front, up in enumerate(parent.tolist()):
+        below[up].append(front)
+        lowest[up] = min(lowest[up], lowest[front])
+    in_runs = [
+        all(lowest[after] == before + 1 for before, after in pairwise(children))
+        for children in below
+    ]
+    apart = np.zeros(n, dtype=np.int64)
+    latest = below[n] if in_runs[n] else []
+    for _ in range(MOST_APART):
+        numbers = ((front, panel[front + 1] - panel[lowest[front]]) for front in latest)
+        large = [front for front, number in numbers if number >= LEAST_APART and in_runs[front]]
+        latest = [child for front in large if len(below[front]) > 1 for child in below[front]]
+        apart[parent[latest]] = 1
+    return apart
+
+
+def _scratch(sizes: Ints, parent: Ints, apart: Ints) -> tuple[Ints, int]:
+    """Places each front's block while it waits for its parent; returns starts and total size.
+
+    Blocks that threads may fill side by side have memory of their own.
+    """
+    n = len(parent)
+    sharing = np.arange(n)  # the last of the fronts that one shares memory with
+    for front in range(n - 1, -1, -1):
+        up = parent[front] if parent[front] >= 0 else n - 1
+        if not (apart[front] or apart[up]):
+            sharing[front] = sharing[up]
+    start, total = np.zeros(n, dtype=np.int64), 0
+    for last in np.unique(sharing):
+        fronts = np.flatnonzero(sharing == last)
+        start[fronts] = total + _stacked(fronts.tolist(), sizes, parent)
+        total = int((start + sizes)[fronts].max())
+    return start, total
+
+
+def _stacked(fronts: list[int], sizes: Ints, parent: Ints) -> Ints:
+    """Places the blocks of fronts in one memory, each in the first gap that it fits in."""
+    start: dict[int, int] = {}
     living: list[int] = []
-    for front, size in enumerate(sizes):
+    for front in fronts:
         at = 0
-        for one in sorted(living, key=lambda one: int(start[one])):
-            if start[one] - at >= size:
+        for one in sorted(living, key=start.__getitem__):
+            if start[one] - at >= sizes[front]:
                 break
-            at = start[one] + sizes[one]
+            at = start[one] + int(sizes[one])
         start[front] = at
         living = [one for one in living if parent[one] != front] + [front]
-    return start, int((start + sizes).max(initial=0))
+    return np.array(list(start.values()), dtype=np.int64)

@@ -37,7 +37,7 @@ bool symmetric_factorise(const Matrix *of) {
     int64_t n = of->pattern.size[0], width = of->pattern.size[1];
     if (width >= 0) return banded_factorise(of->values, n, width);
     if (width == BY_PANELS) return panels_factorise(of->values, &of->pattern.panels);
-    return multifrontal_factorise(of->values, of->scratch, &of->pattern.fronts);
+    return multifrontal_factorise(of->values, of->scratch, &of->pattern.fronts, of->threads);
 }
 
 void symmetric_solve(const Matrix *factor, double *right) {

@@ -71,6 +71,7 @@ class Matrix(NamedTuple):
     values: Floats  # (n_values,) lower half; of a band column by column
     scratch: Floats  # of the factorisation by fronts, or of the solution by panels
     pattern: Pattern  # of the entries
+    threads: int = 1  # that factorise it, where it is large and stored by fronts
 
 
 def number_free_dofs(
@@ -135,10 +136,10 @@ def _in_fronts(site: Floats, pairs: Ints, held: Ints) -> tuple[Ints, Pattern]:
 _NUMBER = {"band": _in_a_band, "panels": _in_panels, "fronts": _in_fronts}
 
 
-def matrix(pattern: Pattern) -> Matrix:
+def matrix(pattern: Pattern, threads: int = 1) -> Matrix:
     """Allocates a matrix of that pattern, not yet cleared."""
     n_scratch = pattern.fronts.scratch[0] + WIDTH * (len(pattern.panels.first) - 1)
-    return Matrix(np.empty(pattern.n_values), np.empty(n_scratch), pattern)
+    return Matrix(np.empty(pattern.n_values), np.empty(n_scratch), pattern, threads)
 
 
 @compiled

@@ -48,7 +48,7 @@ class StaticSolver:
     output_times: Floats  # (n_times,) load parameters, in the order in which they are passed
     relative: float = 1e-10  # tolerance of the residual, relative to the largest reaction
     absolute: float = 1e-11 / 120.0  # its floor by the greatest axial stiffness, mm
-    threads: int = 1  # cases solved side by side
+    threads: int = 1  # see ``Solver``
     # of a similar structure under the same drive, whose steps between the output loads are tried
     # before the path is followed step by step; of the result they change no more than the tolerance
     # allows. Where that structure jumped its step is not tried. A step is the tangent's, bent as it
@@ -110,8 +110,8 @@ class StaticSolver:
         floor = max(self.absolute, rounding) * float(values.law[:, 0].max())
         drag = system.damping if (system.damping[top.free_dofs] > 0).all() else top.scale**2
         return follow(
-            loads, known, pace, bends, trusted, self.leaves, self.sense, system, workspace(system),
-            self.relative, floor, drag, branch, counts,
+            loads, known, pace, bends, trusted, self.leaves, self.sense, system,
+            workspace(system, self.threads), self.relative, floor, drag, branch, counts,
         )  # fmt: skip
 
     def _ended(
@@ -173,7 +173,8 @@ class StaticSolver:
         top = record.topology or self.topology
         system = system_of(top, values)
         bars = empty_bars(system, (len(record.states), len(top.held)))
-        unstable = adjoint(record.states, bar_u, system, workspace(system), top.designed, bars)
+        work = workspace(system, self.threads)
+        unstable = adjoint(record.states, bar_u, system, work, top.designed, bars)
         raise_new_pairs(system.contacts)
         if unstable >= 0:
             raise SimulationError(

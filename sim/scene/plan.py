@@ -76,7 +76,7 @@ def make_plan(
         vertices: (n_vertices, 2) the structure, mm; None for a plan that serves an optimisation
             from the initial one.
         times: (n_times,) of the output, s; None for the loss's own samples.
-        threads: cases to solve side by side.
+        threads: cores to use: for cases side by side, and for the tangent of a large lattice.
         every_case: whether the motion of each load case is wanted, and not its loss alone.
         gradient: whether derivatives are wanted; without, stages are solved as motions need it, and
             a path goes on where units meet.

@@ -137,7 +137,8 @@ def simulate(
         times: (n_times,) of the output, s; by default those of the loss.
         cases: numbers of the load cases; by default all, or those of the ``plan``.
         plan: of `make_plan`, to be made once where many designs are simulated alike.
-        threads: cases solved side by side; by default one, or as many as the ``plan`` has.
+        threads: cores to use, for cases side by side and, where some are left over, for the tangent
+            of a large lattice; by default one, or as many as the ``plan`` has.
 
     Raises:
         ValueError: times are given beside a plan, which has its own.

@@ -100,7 +100,10 @@ def solve_cases(
     Raises:
         SimulationError: a step failed.
     """
-    jobs = list(zip(solvers or [solver] * len(drives), drives, strict=True))
+    each = (
+        _of_one_case(one, solver.threads, len(drives)) for one in solvers or [solver] * len(drives)
+    )
+    jobs = list(zip(each, drives, strict=True))
     results = _spread(lambda job: solve_case(job[0], values, job[1]), jobs, solver.threads)
     shape = (len(drives), -1, solver.topology.n_units, 3)
     displacement = np.stack([u for u, _, _ in results]).reshape(shape)
@@ -111,9 +114,10 @@ def solve_cases(
 def adjoint_cases(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats) -> Gradients:
     """Sweeps back through ``solve_cases``, from loss derivatives shaped as its outputs."""
     flat_u, flat_v = (with_loads(solver.topology, bar) for bar in (bar_u, bar_v))
+    alone = _of_one_case(solver, solver.threads, len(flat_u))
     results = _spread(
         lambda case: _sweep_back(
-            solver, records.values, records.records[case], flat_u[case], flat_v[case]
+            alone, records.values, records.records[case], flat_u[case], flat_v[case]
         ),
         range(len(flat_u)),
         solver.threads,
@@ -142,6 +146,11 @@ def with_loads(topology: Topology, bar: Floats) -> Floats:
     """Appends zeros for the loads to derivatives by motions: (n_cases, n_times, n_dofs)."""
     flat = np.asarray(bar).reshape(len(bar), -1, 3 * topology.n_units)
     return np.pad(flat, ((0, 0), (0, 0), (0, 3 * len(topology.loaded))))
+
+
+def _of_one_case(solver: Any, threads: int, n_cases: int) -> Solver:
+    """Returns a solver of one case of many, with the threads that are left to each."""
+    return replace(solver, threads=max(1, threads // max(1, n_cases)))
 
 
 def _spread(work: Callable[[T], R], items: Sequence[T], threads: int) -> list[R]:

@@ -29,7 +29,7 @@ class Solver(Protocol):
 
     @property
     def threads(self) -> int:
-        """Cases solved side by side."""
+        """Cores to use: cases go side by side, and one alone shares a large tangent among them."""
         ...
 
     def refined(self, record: Any) -> Solver:

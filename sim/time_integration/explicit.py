@@ -53,7 +53,7 @@ class ExplicitSolver:
     duration: float  # s
     n_steps: int  # number of steps to take if that is stable
     output_times: Floats  # (n_times,) times of the output, ascending, s
-    threads: int = 1  # cases solved side by side
+    threads: int = 1  # see ``Solver``; it factorises nothing
     splitting: Splitting = BLANES_MOAN  # the method
 
     def refined(self, record: ExplicitRecord) -> ExplicitSolver:

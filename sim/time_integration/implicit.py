@@ -48,7 +48,7 @@ class ImplicitSolver:
     times: Floats  # (n_steps + 1,) grid, s
     output_times: Floats  # (n_times,) times of the output, s
     tolerance: float = 1e-4  # of the stage velocities, mm/s
-    threads: int = 1  # cases solved side by side
+    threads: int = 1  # see ``Solver``
     # contact is skipped in ligaments whose units can turn by this much against each other before it
     # acts, rad. If one comes that far after all, the case is solved again with all.
     turn_allowance: float = np.inf
@@ -116,8 +116,8 @@ class ImplicitSolver:
         for attempt in range(1, MAX_SPLITS + 1):
             held = drive.values(top.held, time_grid.stage_times(times, tableau.nodes))
             status, step, worst = march(
-                times, step, held, system, workspace(system), tableau.stages, tableau.nodes,
-                self.tolerance, u, v, a, counts,
+                times, step, held, system, workspace(system, self.threads), tableau.stages,
+                tableau.nodes, self.tolerance, u, v, a, counts,
             )  # fmt: skip
             raise_new_pairs(system.contacts)
             if status == CONVERGED:
@@ -151,7 +151,7 @@ class ImplicitSolver:
             bar_states[:n_times],
             bar_states[n_times:],
             system,
-            workspace(system),
+            workspace(system, self.threads),
             self.tableau.stages,
             top.designed,
             bars,

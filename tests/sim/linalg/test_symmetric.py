@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from sim.core import Floats, Ints
 from sim.linalg import (
@@ -16,10 +17,11 @@ from sim.linalg import (
     clear,
     factorise,
     matrix,
+    nested_dissection,
     number_free_dofs,
     solve,
 )
-from sim.linalg.nested_dissection import no_fronts
+from sim.linalg.nested_dissection import Fronts, no_fronts
 from sim.linalg.panels import no_panels
 from sim.linalg.symmetric import seconds
 from tests.sim.structures import dense, mixed_polygons, rotating_squares
@@ -83,6 +85,81 @@ def test_nan_is_not_positive_definite(storage: Storage, place: int) -> None:
     n = made.pattern.n_dofs
     add(made, place % n, place % n, np.nan)
     assert not factorise(made)
+
+
+def parents(fronts: Fronts) -> Ints:
+    """Front that each one's block is added to, -1 where there is none."""
+    found = np.full(len(fronts.update), -1)
+    found[fronts.children] = np.repeat(np.arange(len(found)), np.diff(fronts.child))
+    return found
+
+
+@pytest.fixture
+def apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lets threads share matrices that are far too small for that."""
+    monkeypatch.setattr(nested_dissection, "LEAST_APART", 1)
+
+
+@pytest.mark.usefixtures("apart")
+@pytest.mark.parametrize("name", ["squares", "diagonals", "pieces"])
+def test_threads_factorise_to_the_same_bits(name: str) -> None:
+    made = filled(name, "fronts")
+    alone, shared = made._replace(values=made.values.copy()), made._replace(threads=3)
+    assert made.pattern.fronts.apart.any()
+    assert factorise(alone)
+    assert factorise(shared)
+    np.testing.assert_array_equal(shared.values, alone.values)
+
+
+@pytest.mark.usefixtures("apart")
+@pytest.mark.parametrize("place", [0, 60, 120, -1])
+def test_what_one_thread_finds_indefinite_is_not_factorised(place: int) -> None:
+    made = filled("squares", "fronts")._replace(threads=4)
+    at = place % made.pattern.n_dofs
+    add(made, at, at, -1e3)
+    assert not factorise(made)
+
+
+@pytest.mark.usefixtures("apart")
+@pytest.mark.parametrize("seed", range(10))
+def test_what_threads_share_has_runs_and_memory_of_its_own(seed: int) -> None:
+    """Also where units are missing, so that a part may not be next to the cut that made it."""
+    site, pairs = porous(seed)
+    fronts = number_free_dofs(site, pairs, np.zeros(0, dtype=int), ("fronts",))[1].fronts
+    n, up = len(fronts.update), parents(fronts)
+    ends, sizes = fronts.update + np.diff(fronts.edge) ** 2, np.diff(fronts.edge)
+    assert fronts.apart.any() or seed > 2
+    side_by_side = [(0, n - 1)]
+    for split in np.flatnonzero(fronts.apart)[::-1].tolist():
+        first, last = next(run for run in side_by_side if run[1] == split)
+        children = fronts.children[fronts.child[split] : fronts.child[split + 1]].tolist()
+        firsts = [first, *(child + 1 for child in children)]
+        side_by_side.remove((first, last))
+        side_by_side += zip(firsts, [*children, split], strict=True)
+    for first, last in side_by_side:
+        run = range(first, last + 1)
+        assert all(up[k] in run or k == last or up[k] < 0 for k in run)
+        for front in (k for k in run if sizes[k]):
+            waiting = [k for k in range(n) if k not in run or k < front <= up[k]]
+            apart = (ends[waiting] <= fronts.update[front]) | (
+                fronts.update[waiting] >= ends[front]
+            )
+            assert (apart | (sizes[waiting] == 0)).all()
+
+
+def porous(seed: int) -> tuple[Floats, Ints]:
+    """Sites and pairs of a connected lattice from which the more units are missing, the later."""
+    there = np.random.default_rng(seed).random((23, 15)) < 1.0 - 0.02 * seed
+    number = np.cumsum(there).reshape(there.shape) - 1
+    rows, columns = there[1:] & there[:-1], there[:, 1:] & there[:, :-1]
+    one = np.concatenate([number[:-1][rows], number[:, :-1][columns]])
+    other = np.concatenate([number[1:][rows], number[:, 1:][columns]])
+    graph = sp.coo_array((np.ones(len(one)), (one, other)), shape=(there.sum(),) * 2)
+    _, piece = sp.csgraph.connected_components(graph)
+    kept = piece == np.bincount(piece).argmax()
+    number = np.where(kept, np.cumsum(kept) - 1, -1)
+    pairs = np.stack([number[one], number[other]], axis=1)
+    return np.argwhere(there)[kept].astype(float), pairs[(pairs >= 0).all(axis=1)]
 
 
 @pytest.mark.parametrize("width", [20, 120])
