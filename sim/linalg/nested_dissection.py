@@ -169,9 +169,7 @@ def _apart(parent: Ints, panel: Ints) -> Ints:
     missing: then there are no runs.
     """
     n = len(parent)
-    below: list[list[int]] = [
-        [] for _ in range(n + 1)
-    ]  # the last of these, of those without parent
+    below: list[list[int]] = [[] for _ in range(n + 1)]  # the last list: those without parent
     lowest = np.arange(n + 1)
     for front, up in enumerate(parent.tolist()):
         below[up].append(front)
