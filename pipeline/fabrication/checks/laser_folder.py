@@ -100,18 +100,19 @@ def _check_dots(record: PackageRecord) -> Iterator[Fault]:
             holes = [curve.polygon for curve in curves if curve.layer == INNER and curve.closed]
             scored = [curve.line for curve in curves if curve.layer == SCORE]
             found += len(holes)
-            yield from _check_template(drawing, part, holes, scored)
+            yield from check_template(drawing, part, holes, scored)
     yield from _check_count(record, "dot", found, "markers")
 
 
-def _check_template(
+def check_template(
     drawing: Drawing, part: str, holes: Sequence[Polygon], scored: Sequence[Geometry]
 ) -> Iterator[Fault]:
     """Checks holes against the scored outlines of units around them, where these are whole.
 
-    Several dots of a unit lie about its centroid; one lies there too if there is room for it.
+    Several dots of a unit lie about its centroid; one lies there too if there is room for it. A
+    template that is split through units scores these by lines without a loop.
     """
-    outlines, open_lines, _, _ = shapely.polygonize_full(list(scored))
+    outlines, _, open_lines, _ = shapely.polygonize_full(list(scored))
     left = list(holes)
     for outline in shapely.get_parts(outlines):
         mine = [hole for hole in left if outline.intersects(hole)]

@@ -1,13 +1,16 @@
 """Every tracking dot is drawn once, however the template is split."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import shapely
 from shapely import Point
 
+from pipeline.fabrication.checks.laser_folder import check_template
 from pipeline.fabrication.fixtures import templates
 from pipeline.fabrication.parts import BuiltSpecimen, Circle
+from pipeline.fabrication.readback import Drawing
 from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.sections import Fabrication
 from tests.pipeline.fabrication import handmade
@@ -38,3 +41,20 @@ def test_a_dot_on_a_cut_is_drawn_on_one_tile(centre: tuple[float, float]) -> Non
     whole = shapely.union_all([part.outline for part in made])
     assert whole.area == pytest.approx(sum(part.outline.area for part in made))
     assert whole.area == pytest.approx(shapely.box(*whole.bounds).area)
+
+
+@pytest.mark.parametrize("scored", [True, False], ids=["scored", "not scored"])
+def test_dots_of_a_unit_that_a_template_is_split_through_are_none_too_many(scored: bool) -> None:
+    """Its outline is open on both templates; where none is scored the dots are a fault."""
+    (unit, *others) = with_dots((6.0, -2.0), (6.0, 2.0)).units
+    long = shapely.box(-5.0, -5.0, 11.0, 5.0)
+    specimen = replace(handmade.specimen(), units=(replace(unit, outline=long), *others))
+    made = list(templates(specimen, handmade.SPACING, SPLIT))
+    crossed = next(part for part in made if part.holes)
+    assert crossed.outline.crosses(long.exterior)
+    holes = [Point(hole.centre).buffer(hole.diameter / 2) for hole in crossed.holes]
+    lines = [shapely.LineString(line) for line in crossed.scores] if scored else []
+    faults = list(check_template(Drawing(Path("template.dxf"), (), {}), "TEMPLATE1", holes, lines))
+    assert [fault.what for fault in faults] == (
+        [] if scored else ["2 dots in no unit that is scored"]
+    )
