@@ -50,7 +50,7 @@ def test_the_continuous_adjoint_of_diffrax_comes_to_that_of_its_steps() -> None:
         for name in ("diffrax Tsit5", "diffrax Tsit5, backsolve")
     )
     found = errors(continuous, discrete)
-    assert found["displacement"] == 0.0
+    assert found["displacement"] < 1e-12  # two programs of the same steps
     assert 0 < found["gradient"] < 1e-3
 
 

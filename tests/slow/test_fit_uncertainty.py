@@ -19,6 +19,11 @@ from sim.solvers import PrescribedMotion
 from tests.pipeline.calibration.specimens import TRUTH, described, loaded
 
 SPECIMEN = ROOT / "experiments/calibration/specimens/shaken.yaml"
+SLOWER = {
+    "width: 25 ms": "width: 60 ms",
+    "delay: 75 ms": "delay: 180 ms",
+    "duration: 0.3 s": "duration: 0.45 s",
+}
 ERROR = {"displacement": "0.01 mm", "rotation": "0.05 deg"}
 
 
@@ -26,7 +31,10 @@ ERROR = {"displacement": "0.01 mm", "rotation": "0.05 deg"}
 def fit(tmp_path_factory: pytest.TempPathFactory) -> Fit:
     """A motion in time at its true constants, without errors of its steps, the drive's noise in."""
     folder = tmp_path_factory.mktemp("shaken")
-    slower = SPECIMEN.read_text().replace("width: 25 ms", "width: 60 ms")
+    slower = SPECIMEN.read_text()
+    for before, after in SLOWER.items():
+        assert before in slower
+        slower = slower.replace(before, after)
     (folder / SPECIMEN.name).write_text(slower)
     track: dict[str, Any] = {"kind": "track", "name": "motion", "structure": "altered"}
     track |= {

@@ -21,7 +21,7 @@ def test_the_tutorial(reader: Reader) -> None:
     assert load(problem).title == "Logo"
     assert preset_names(problem) == ("quick",)
     assert (root / "results/logo@quick/report/index.html").stat().st_size > 100_000
-    altered, cloaked = re.findall(r"error ([\d.]+) force", told)
+    altered, cloaked = re.findall(r"loss ([\d.]+) force", told)
     assert float(cloaked) < 0.8 * float(altered)
     size = sum(path.stat().st_size for path in (root / "results/logo@quick").rglob("*"))
     stated = re.search(r"^\| a draft .*\| (\d+) \|$", text("docs/install.md"), re.MULTILINE)
