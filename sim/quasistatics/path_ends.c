@@ -29,14 +29,12 @@ double path_ends_leave(
     double way = length_of(w->product, s->held, s->n_held, s);
     total_locate(motion, s, &w->kinematics);
     total_hessian_product(motion, s, &w->kinematics, w->product, w->force);
-    double along = 0.0, force = 0.0;
-    EACH(i, s->n_dofs) {
-        int64_t d = s->dofs[i];
-        along -= mode[i] * w->force[d] / s->scale[d];
-        force += square(w->force[d] / s->scale[d]);
-    }
-    bool branches = fabs(along) <= UNLOADED * sqrt(force);
+    double along = critical_modes_load(mode, s, w), force = 0.0;
+    EACH(i, s->n_dofs) force += square(w->force[s->dofs[i]] / s->scale[s->dofs[i]]);
+    double unloaded = UNLOADED * sqrt(force);
+    bool branches = fabs(along) <= unloaded;
     if (branches) {
+        if (isfinite(first)) critical_modes_mix(mode, CRITICAL * first, unloaded, s, w);
         along = sense;
         ahead = most(ahead, least(1.0, BEYOND / most(way, BEYOND)));
     }

@@ -97,6 +97,10 @@ void limit_point_locate(
     const Workspace *w);
 void limit_point_bend(const LimitPoint *limit, double ahead, double *step, const System *s);
 
+double critical_modes_load(const double *mode, const System *s, const Workspace *w);
+void critical_modes_mix(
+    double *mode, double largest_value, double largest_load, const System *s, const Workspace *w);
+
 void path_ends_scatter(double *mode, int64_t n);
 double path_ends_leave(
     double *motion, double *load, double ahead, double *mode, double sense, double first,

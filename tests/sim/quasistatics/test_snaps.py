@@ -40,6 +40,23 @@ def test_a_strut_of_three_units_branches_where_the_formula_says() -> None:
     np.testing.assert_allclose(ends[0][4], -ends[1][4], rtol=1e-7)
 
 
+@pytest.mark.parametrize("coupling", [0.0, 1e-10, 1e-8, 1e-6])
+def test_struts_that_buckle_at_once_go_ways_of_their_own(coupling: float) -> None:
+    """Springs between two struts part their modes, and which way both buckle, by nothing to see."""
+    pair = quads(3, 2, 15.0, LENGTH, 0.0)
+    left = np.array([0, 3])
+    rig = Rig(pair, left, left + 2, LinearRamp(-0.1, 1.0))
+    values = with_law(rig, 120.0, 1.19, 30.0)
+    rows = pair.index[pair.unit[pair.ligaments], 1]
+    values.law[rows[:, 0] != rows[:, 1]] *= coupling
+    for count in (1, 7):
+        solver = StaticSolver(rig.topology, np.arange(1, count + 1) / count)
+        states, _, record = solver.forward(values, rig.drive)
+        assert record.jumped[record.jumped > 0].tolist() == [BRANCHING]
+        aside = states[-1].reshape(2, 3, 3)[:, 1, 1]
+        np.testing.assert_allclose(aside, [-0.35, 0.35], atol=2e-3)
+
+
 class Truss:
     """A unit that moves only up and down, held by a spring above, between two that pass it by.
 
