@@ -22,6 +22,8 @@ _BETTER = 0.6
 _MAD, _TINY = 1.4826, 1e-9
 _NODES, _STEP = 48, 0.5
 """Of a grid over the places of a specimen, each way; mm of a difference."""
+_BLOCK = 128
+"""Frames whose variances are computed at once: long recordings need no more memory."""
 
 
 def fit_camera(
@@ -69,11 +71,13 @@ def cameras_alike(points: Floats, pixels: Floats, camera: Camera) -> list[Camera
     return lens.alike()
 
 
-def lens_variance(camera: Camera, alike: list[Camera], centre: Floats, motion: Reals) -> Floats:
-    """Computes variances (frames, units, 3) of motions by the doubt about a camera, mm and rad.
+def lens_variance(
+    camera: Camera, alike: list[Camera], centre: Floats, motion: Reals
+) -> Iterator[tuple[slice, Floats]]:
+    """Yields blocks of frames, and variances (frames, units, 3) of motions by the camera's doubt.
 
     Away from where it was fitted its distortion is extrapolated, and a unit that travels through
-    the picture seems to move by the change of that error.
+    the picture seems to move by the change of that error. Variances are in mm^2 and rad^2.
 
     Args:
         camera: by which the motions were found.
@@ -81,24 +85,30 @@ def lens_variance(camera: Camera, alike: list[Camera], centre: Floats, motion: R
         centre: (units, 2) places at rest, mm.
         motion: (frames, units, 3) from there, NaN where missing.
     """
-    out = np.full(motion.shape, np.nan)
-    known = np.isfinite(motion[..., 0])
-    unit = np.nonzero(known)[1]
-    if not len(unit):
-        return out
-    now = centre[unit] + motion[known][:, :2]
-    both = np.concatenate([now, centre])
-    low, high = both.min(axis=0), both.max(axis=0)
+    blocks = [slice(first, first + _BLOCK) for first in range(0, len(motion), _BLOCK)]
+    bounds = [centre.min(axis=0), centre.max(axis=0)]
+    for block in blocks:
+        now = (centre + motion[block, :, :2])[np.isfinite(motion[block, :, 0])]
+        bounds += [now.min(axis=0, initial=np.inf), now.max(axis=0, initial=-np.inf)]
+    low, high = np.min(bounds, axis=0), np.max(bounds, axis=0)
     nodes = np.stack(np.meshgrid(*np.linspace(low, high, _NODES).T, indexing="ij"), axis=-1)
     cells = np.maximum(high - low, 1e-9) / (_NODES - 1)
-    here, there = ((place - low).T / cells[:, None] for place in (now, centre))
-    total = np.zeros((len(unit), 3))
-    for errors in _errors(camera, alike, nodes):
-        for dof, field in enumerate(errors):
-            rest = map_coordinates(field, there, order=1)[unit]
-            total[:, dof] += (map_coordinates(field, here, order=1) - rest) ** 2
-    out[known] = total
-    return out
+    there = (centre - low).T / cells[:, None]
+    fields = [
+        [(field, map_coordinates(field, there, order=1)) for field in errors]
+        for errors in _errors(camera, alike, nodes)
+    ]
+    for block in blocks:
+        known = np.isfinite(motion[block, :, 0])
+        unit = np.nonzero(known)[1]
+        here = (centre[unit] + motion[block][known][:, :2] - low).T / cells[:, None]
+        total = np.zeros((len(unit), 3))
+        for errors in fields:
+            for dof, (field, rest) in enumerate(errors):
+                total[:, dof] += (map_coordinates(field, here, order=1) - rest[unit]) ** 2
+        out = np.full((*known.shape, 3), np.nan)
+        out[known] = total
+        yield block, out
 
 
 class _Lens:

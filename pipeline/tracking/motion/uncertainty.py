@@ -90,10 +90,25 @@ def calibrate_sigma(
     time = np.arange(len(motion), dtype=float) if time is None else time
     parts = np.array_split(np.arange(len(motion)), -(-len(motion) // _MOST_FRAMES))
     for part in (slice(frames[0], frames[-1] + 1) for frames in parts):
-        told = motion[part].astype(float), _calmed(sigma[part].astype(float))
-        found = _found(*told, near, steady[part], time[part], coded)
-        out[part] = told[1] * np.sqrt(found[0] + reference * found[1])
+        seen = motion[part].astype(float), sigma[part].astype(float)
+        out[part] = _calibrated(*seen, near, steady[part], time[part], reference, coded)
+        del seen  # before the next part's
     return out
+
+
+def _calibrated(
+    motion: Floats,
+    sigma: Floats,
+    near: Ints,
+    steady: Mask,
+    time: Floats,
+    reference: float,
+    coded: bool,
+) -> Floats:
+    """Scales the uncertainties of some frames as ``calibrate_sigma`` does."""
+    told = _calmed(sigma)
+    factors, shares = _found(motion, told, near, steady, time, coded)
+    return np.asarray(told * np.sqrt(factors + reference * shares))
 
 
 def nearest(centre: Floats) -> Ints:

@@ -136,7 +136,7 @@ def track_video(
                 100 * unsure.mean(),
             )
     _count_from_rest(motion, rest, np.nan_to_num(places.offset).astype(np.float32))
-    missed += places.swing_variance(motion[..., 2]) + _lens_variance(specimen, calibration, motion)
+    _add_variances(missed, motion, places, specimen, calibration)
     remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     qualities[np.isnan(motion[..., 0]) & (qualities == GOOD)] = HIDDEN  # as the supports are
     faults = timing_faults(time, motion, sigmas, same)
@@ -155,20 +155,24 @@ def track_video(
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended, rest)
 
 
-def _lens_variance(
-    specimen: SpecimenOutlines, calibration: CameraCalibration, motion: Reals
-) -> Floats:
-    """Computes variances of motions by the camera's, and warns where these are too large."""
-    camera, alike = calibration.camera, calibration.alike
-    variance = lens_variance(camera, alike, specimen.centre, motion)
-    far = variance[..., :2].max(axis=-1) > (_VAGUE[0] * calibration.pixel) ** 2
-    if far.any():
+def _add_variances(
+    missed: Reals,
+    motion: Reals,
+    places: RestPlaces,
+    specimen: SpecimenOutlines,
+    calibration: CameraCalibration,
+) -> None:
+    """Adds variances of motions by those of rest places and camera; warns of too large ones."""
+    camera, limit, far = calibration.camera, (_VAGUE[0] * calibration.pixel) ** 2, 0
+    for frames, bent in lens_variance(camera, calibration.alike, specimen.centre, motion):
+        far += int((bent[..., :2].max(axis=-1) > limit).sum())
+        missed[frames] += places.swing_variance(motion[frames, :, 2]) + bent
+    if far:
         LOG.warning(
             "%.2g %% of the poses are lost, as they lie where the specimen at rest does not tell"
             " how the lens bends the picture: start where it fills more of it",
-            100 * far.mean(),
+            100 * far / motion[..., 0].size,
         )
-    return variance
 
 
 def _vague(sigma: Reals, pixel: float) -> Mask:
