@@ -102,7 +102,8 @@ def _quantiles(fit: Fit, turn: Floats) -> Floats:
         part = spread[rows == k].sum(axis=0)
         variance += part
         doubt += 0.0 if each.measured.known else part**2 / max(left, 1.0)
-    freedom = variance**2 / np.maximum(doubt, 1e-12 * variance**2)
+    freedom, told = np.full_like(variance, _MANY), variance > 0.0  # or no set tells of it
+    freedom[told] = variance[told] ** 2 / np.maximum(doubt, 1e-12 * variance**2)[told]
     return np.where(freedom < _MANY, stdtrit(np.maximum(freedom, 1.0), 0.975), ndtri(0.975))
 
 

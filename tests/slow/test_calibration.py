@@ -211,6 +211,7 @@ TRACK = """
 """
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_stiffness_ratios_from_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.copy(SPECIMEN, tmp_path / "squeezed.yaml")
     track = yaml.safe_load(TRACK)
