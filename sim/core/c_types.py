@@ -26,6 +26,9 @@ _NUMBERS: dict[Any, tuple[str, Any]] = {
 
 Packer = Callable[[Any], Any]
 
+KEPT, SMALL = 3, 4 << 20
+"""Records of a type that are kept when they have been passed, and bytes of their arrays at most."""
+
 _KEYWORDS = {"void", "double", "float", "int", "long", "short", "char", "register", "restrict"}
 
 
@@ -47,9 +50,8 @@ def argument(hint: Any) -> CType:  # noqa: ANN401  (a type)
         name, passed = _NUMBERS[hint]
         return CType(f"{name} ", passed, passed)
     if is_record(hint):
-        structure, pack = _structure(hint), packer(hint)
-        pointer = ctypes.POINTER(structure)
-        return CType(f"const {hint.__name__} *", pointer, lambda value: ctypes.byref(pack(value)))
+        pointer = ctypes.POINTER(_structure(hint))
+        return CType(f"const {hint.__name__} *", pointer, _reference(hint))
     return CType(f"{_element(hint)} *", ctypes.c_void_p, _address_of(hint))
 
 
@@ -141,6 +143,36 @@ def packer(record: Any) -> Packer:  # noqa: ANN401  (a type)
         return structure(*filled)
 
     return pack
+
+
+@cache
+def _reference(record: Any) -> Packer:  # noqa: ANN401  (a type)
+    """Makes the function that packs a record and refers to it, once for many calls.
+
+    Short calls in a row take the same system and workspace, and take less time than packing these.
+    The last records are kept if they are small: as long as they live, their arrays stay in place.
+    """
+    pack = packer(record)
+    last: tuple[tuple[Any, Any], ...] = ()
+
+    def refer(value: Any) -> Any:  # noqa: ANN401  (a record)
+        nonlocal last
+        for known, packed in last:
+            if known is value:
+                return ctypes.byref(packed)
+        packed = pack(value)
+        if _size(value) <= SMALL:
+            last = ((value, packed), *last[: KEPT - 1])
+        return ctypes.byref(packed)
+
+    return refer
+
+
+def _size(value: Any) -> int:  # noqa: ANN401  (of a record)
+    """Sums up the bytes of all arrays."""
+    if isinstance(value, tuple):
+        return sum(map(_size, value))
+    return value.nbytes if isinstance(value, np.ndarray) else 0
 
 
 @cache

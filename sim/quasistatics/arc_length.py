@@ -10,6 +10,7 @@ Solids Struct. 15, 529). Beyond it equilibria are unstable until the path turns 
 """
 
 from collections.abc import Iterator
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ from sim.core import Floats, Ints, NewContactPairs
 from sim.energy import System, Topology, gradient, hessian_product, locate, system_of, workspace
 from sim.quasistatics.path_ends import BRANCHING
 from sim.quasistatics.static_solver import StaticRecord, StaticSolver
-from sim.solvers import PrescribedMotion
+from sim.solvers import PrescribedMotion, SelectedMotion
 from sim.structure import ConcreteParameters
 from sim.vibration import WholeTangent
 
@@ -40,6 +41,8 @@ PAST = 1e-6
 """Share of its load by which a path may pass the snap that it turns at."""
 FEW = 20
 """Degrees of freedom below which all eigenvalues are computed."""
+RECENT = 4
+"""Loads at which the drive's rates are kept."""
 
 
 class EquilibriumTrace(NamedTuple):
@@ -174,6 +177,12 @@ class Tangent:
         return 1.0 / found, modes
 
 
+def _rates(drive: SelectedMotion, weights: Floats, load: float) -> tuple[Floats, float]:
+    """Computes the rates (n_held,) of the held dofs, and their weighted norm, mm."""
+    rates = drive.rates(np.array([load]))[0]
+    return rates, max(float(np.linalg.norm(rates * weights)), 1e-12)
+
+
 class ArcLengthPath:
     """Evaluates balance and tangent of a structure along its drive."""
 
@@ -181,12 +190,15 @@ class ArcLengthPath:
         self, topology: Topology, values: ConcreteParameters, drive: PrescribedMotion
     ) -> None:
         self.system: System = system_of(topology, values)
-        self._drive, self._work = drive, workspace(self.system)
+        self._work = workspace(self.system)
         self._tangent = WholeTangent(topology, values)
         self._n_moving = 3 * topology.n_units
         self._last: tuple[PathPoint, Tangent] | None = None
         self._held, self.free = topology.held, np.sort(topology.free_dofs)
-        self.scale, self._scale = topology.scale[self.free], topology.scale
+        self._drive = drive.on(self._held)
+        weights = topology.scale[self._held]
+        self._rates = lru_cache(RECENT)(partial(_rates, self._drive, weights))
+        self.scale = topology.scale[self.free]
 
     def points(
         self,
@@ -225,7 +237,7 @@ class ArcLengthPath:
     def point(self, load: float, state: Floats) -> PathPoint:
         """Places the held dofs of a state where the drive has them."""
         placed = np.array(state, dtype=float)
-        placed[self._held] = self._drive.values(self._held, np.array([load]))[0]
+        placed[self._held] = self._drive.values(np.array([load]))[0]
         return PathPoint(load, placed)
 
     def correct(
@@ -323,11 +335,6 @@ class ArcLengthPath:
     def _pace(self, load: float) -> float:
         """Returns the way of the held dofs over the load parameter, mm."""
         return self._rates(load)[1]
-
-    def _rates(self, load: float) -> tuple[Floats, float]:
-        """Returns the rates (n_held,) of the held dofs, and the norm of them, mm."""
-        rates = self._drive.rates(self._held, np.array([load]))[0]
-        return rates, max(float(np.linalg.norm(rates * self._scale[self._held])), 1e-12)
 
     def _force(self, point: PathPoint) -> Floats:
         gradient(point.state, self.system, self._work.kinematics, self._work.force)

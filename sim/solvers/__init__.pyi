@@ -27,6 +27,7 @@ from .loads import held_dofs as held_dofs
 from .loads import held_values as held_values
 from .loads import single_motions as single_motions
 from .prescribed_motion import PrescribedMotion as PrescribedMotion
+from .prescribed_motion import SelectedMotion as SelectedMotion
 from .solver import Solver as Solver
 from .validation import check_connected as check_connected
 from .validation import check_free_dofs as check_free_dofs

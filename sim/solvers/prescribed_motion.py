@@ -15,8 +15,9 @@ from sim.solvers.loads import (
     FORCE,
     MotionLaw,
     Together,
-    held_values,
+    held_selection,
     loaded_units,
+    selected,
 )
 from sim.structure import ConcreteParameters
 
@@ -69,7 +70,15 @@ class PrescribedMotion(NamedTuple):
 
     def values(self, held: Ints, times: Floats) -> Floats:
         """Values (n_times, n_held) of the held dofs."""
-        return np.asarray(held_values(held, self.units, self._at(times), self.control))
+        return self.on(held).values(times)
+
+    def rates(self, held: Ints, times: Floats) -> Floats:
+        """Their rates of change, per s."""
+        return self.on(held).rates(times)
+
+    def on(self, held: Ints) -> "SelectedMotion":
+        """Selects the held dofs (n_held,) that it moves, for motions at many times."""
+        return SelectedMotion(self, held_selection(held, self.units, self.control))
 
     def _at(self, times: Floats) -> Floats:
         """Computes the motion in NumPy, whichever arrays its numbers are."""
@@ -84,16 +93,26 @@ class PrescribedMotion(NamedTuple):
         state[topology.held] = self.values(topology.held, np.array([time]))[0]
         return state
 
-    def rates(self, held: Ints, times: Floats) -> Floats:
-        """Their rates of change, per s."""
-        rates = self._of_law(rates_of, times)
-        return np.asarray(held_values(held, self.units, rates, self.control))
-
     def _of_law(self, of: Callable[..., Numbers], times: Floats) -> Floats:
         """Computes a derivative (n_times, ..., 3) of the motion."""
         # at a number of times that is a power of 2: JAX compiles for every new one
         padded = np.pad(times, (0, (1 << (len(times) - 1).bit_length()) - len(times)), mode="edge")
         return np.asarray(of(self.motion, padded))[: len(times)]
+
+
+class SelectedMotion(NamedTuple):
+    """Holds a drive beside the held dofs that it moves."""
+
+    drive: PrescribedMotion
+    selection: Floats  # (3 n, n_held) ones where a component is that of a held dof
+
+    def values(self, times: Floats) -> Floats:
+        """Values (n_times, n_held) of the held dofs."""
+        return np.asarray(selected(self.selection, self.drive._at(times)))
+
+    def rates(self, times: Floats) -> Floats:
+        """Their rates of change, per s."""
+        return np.asarray(selected(self.selection, self.drive._of_law(rates_of, times)))
 
 
 @jax.jit

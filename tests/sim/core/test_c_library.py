@@ -1,5 +1,6 @@
 """Python declares, C defines: arguments and results pass as both mean them."""
 
+import weakref
 from pathlib import Path
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from sim.core import CLibrary, Floats, Ints
+from sim.core.c_types import KEPT, SMALL
 
 
 class Springs(NamedTuple):
@@ -82,6 +84,27 @@ def bound(library: CLibrary) -> SimpleNamespace:
 
 def test_records_arrays_and_numbers_reach_c(bound: SimpleNamespace) -> None:
     assert bound.energy(np.array([1.0, 2.0]), CHAIN) == 2.0 * (0.5 + 6.0) + 100 + 7
+
+
+def test_records_in_turns_are_told_apart(bound: SimpleNamespace) -> None:
+    chains = [CHAIN._replace(offset=100 * number) for number in range(KEPT + 2)]
+    told = [float(bound.energy(np.ones(2), chain)) for chain in (*chains, *reversed(chains))]
+    once = [11.0 + 100 * number for number in range(KEPT + 2)]
+    assert told == [*once, *reversed(once)]
+    stiffness = np.array([1.0, 3.0])
+    chain = Chain(Springs(stiffness, np.array([7]), 2.0), 0)
+    assert bound.energy(np.ones(2), chain) == 11.0
+    stiffness[:] = 0.0
+    assert bound.energy(np.ones(2), chain) == 7.0
+
+
+@pytest.mark.parametrize(("size", "lives"), [(10, True), (SMALL // 8 + 1, False)])
+def test_small_records_alone_live_on(bound: SimpleNamespace, size: int, lives: bool) -> None:
+    stiffness = np.zeros(size)
+    alive = weakref.ref(stiffness)
+    bound.energy(np.ones(size), Chain(Springs(stiffness, np.array([7]), 2.0), 0))
+    del stiffness
+    assert (alive() is not None) == lives
 
 
 def test_rows_are_counted_and_arrays_changed_in_place(bound: SimpleNamespace) -> None:
