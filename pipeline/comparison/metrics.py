@@ -66,34 +66,41 @@ def compute_metrics(pair: Pair) -> Floats:
 
 
 def _moments(pair: Pair) -> _Moments:
-    both = np.isfinite(pair.measured - pair.simulated)
-    count = both.sum(axis=(0, 1))
+    known = np.isfinite(pair.measured - pair.simulated)
+    count = np.count_nonzero(known, axis=(0, 1))
 
-    def mean(values: Floats) -> Floats:
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray(np.where(both, values, 0.0).sum(axis=(0, 1)) / count)
+    def mean(*factors: Floats) -> Floats:
+        return _sum(*factors) / count
 
-    noise = mean(np.nan_to_num(pair.sigma) ** 2)
-    extra = noise if pair.added else np.zeros_like(noise)
-    first, last = mean(pair.measured), mean(pair.simulated)
-    variance = np.maximum(mean(pair.measured**2) - first**2 - extra, 0.0)
-    spread = mean(pair.simulated**2) - last**2
-    product = mean(pair.measured * pair.simulated) - first * last
+    sigma = np.where(known, np.nan_to_num(pair.sigma), 0.0)
+    measured, simulated = (np.where(known, side, 0.0) for side in (pair.measured, pair.simulated))
+    apart = measured - simulated
     with np.errstate(invalid="ignore", divide="ignore"):
+        noise = mean(sigma, sigma)
+        extra = noise if pair.added else np.zeros_like(noise)
+        first, last, square = mean(measured), mean(simulated), mean(measured, measured)
+        variance = np.maximum(square - first**2 - extra, 0.0)
+        spread = mean(simulated, simulated) - last**2
+        product = mean(measured, simulated) - first * last
         alike = product / np.sqrt(variance * spread)
-    residual = np.maximum(mean((pair.measured - pair.simulated) ** 2) - extra, 0.0)
-    return _Moments(residual, mean(pair.measured**2) - extra, variance, noise, alike)
+        residual = np.maximum(mean(apart, apart) - extra, 0.0)
+    return _Moments(residual, square - extra, variance, noise, alike)
+
+
+def _sum(*factors: Floats) -> Floats:
+    """Sums the product of one or two fields (frames, units, dofs) over frames and units."""
+    return np.asarray(np.einsum(f"{','.join(['fud'] * len(factors))}->d", *factors))
 
 
 def _shift(pair: Pair) -> Floats:
     """Computes the delay (dofs,) of the measured side, s, to first order in it."""
     if pair.slope is None:
         return np.full(pair.measured.shape[-1], np.nan)
-    ahead = (pair.measured - pair.simulated) * pair.slope
-    known = np.isfinite(ahead)
-    steep = np.where(known, pair.slope, 0.0) ** 2
+    apart = pair.measured - pair.simulated
+    known = np.isfinite(apart) & np.isfinite(pair.slope)
+    slope = np.where(known, pair.slope, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(-np.where(known, ahead, 0.0).sum(axis=(0, 1)) / steep.sum(axis=(0, 1)))
+        return -_sum(np.where(known, apart, 0.0), slope) / _sum(slope, slope)
 
 
 def align_in_time(pair: Pair, time: Floats) -> tuple[Pair, Floats]:

@@ -16,6 +16,8 @@ from sim.structure.lattice import Lattice
 OVERLAP_AREA = 1e-9
 """Intersections of a smaller area (mm^2) are touching units, not overlapping ones."""
 
+_WIDER = 1.0 + 1e-9  # of a bound, for rounding
+
 
 @dataclass(frozen=True)
 class Gap:
@@ -86,10 +88,14 @@ def clearance(lattice: Lattice, vertices: Floats, motion: Floats) -> Clearance:
 def _smallest_gap(units: NDArray[np.object_]) -> Gap:
     if len(units) < 2:
         return Gap(np.inf, (-1, -1))
-    bounds = shapely.STRtree(units).query_nearest(units, exclusive=True, return_distance=True)
-    (first, second), distance = bounds
-    nearest = np.argmin(distance)
-    a, b = sorted((int(first[nearest]), int(second[nearest])))
+    # No pair is nearer whose boxes are farther apart than the nearest of units that follow each
+    # other, which in a lattice are neighbours.
+    bound = shapely.distance(units[:-1], units[1:]).min()
+    around = shapely.bounds(units) + _WIDER * bound * np.array([-1.0, -1.0, 1.0, 1.0])
+    pairs = _ascending(shapely.STRtree(units).query(shapely.box(*around.T)))
+    distance = shapely.distance(*units[pairs.T])
+    nearest = int(np.argmin(distance))
+    a, b = pairs[nearest].tolist()
     return Gap(float(distance[nearest]), (a, b))
 
 
