@@ -40,7 +40,8 @@ class TemplateGrid:
     Attributes:
         step: distance of the nodes, mm.
         half: from the middle to the last node, mm.
-        x, y: (nodes, nodes) places relative to the centroid, mm.
+        line: (nodes,) places of their columns, and of their rows, relative to the centroid, mm.
+        x, y: (nodes, nodes) places, mm.
         inside: (units, nodes, nodes) signed distance to the outline, positive inside, mm.
         joint: (units, nodes, nodes) distance to the nearest vertex that bears a ligament, mm.
         centre: (units, 2) the centroids at rest, mm.
@@ -52,7 +53,7 @@ class TemplateGrid:
         self.step = 1 / (NODES_PER_PIXEL * px_per_mm)
         nodes = int(np.ceil((specimen.radius.max() + reach) / self.step)) + 3
         self.half = nodes * self.step
-        line = np.arange(-nodes, nodes + 1) * self.step
+        self.line = line = self.step * np.arange(-nodes, nodes + 1, dtype=np.float64)
         self.x, self.y = np.meshgrid(line, line)
         shape = (specimen.count, *self.x.shape)
         self.inside = np.empty(shape, np.float32)
@@ -80,20 +81,17 @@ class TemplateGrid:
 
     def signed_distance(self, polygon: Floats) -> Singles:
         """Measures from the nodes to a polygon about the centroid, positive inside, mm."""
-        square = np.full(self.x.shape, np.inf)
-        odd = np.zeros(self.x.shape, dtype=bool)
-        column, row = self.x[0], self.y[:, :1]  # broadcast: what depends on one alone costs nothing
-        for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-            ex, ey = bx - ax, by - ay
-            right, up = column - ax, row - ay
-            along = (right * ex + up * ey) / (ex * ex + ey * ey)
-            np.clip(along, 0, 1, out=along)
-            square = np.minimum(square, (right - along * ex) ** 2 + (up - along * ey) ** 2)
-            if by != ay:
-                crossing = (row < ay) != (row < by)
-                odd ^= crossing & (column < ax + up * ex / ey)
-        far = np.sqrt(square)
-        return np.where(odd, far, -far).astype(np.float32)
+        found = np.empty(self.x.shape, np.float32)
+        room = np.empty((2, len(self.line)))
+        measure_distance(self.line, np.ascontiguousarray(polygon, dtype=np.float64), room, found)
+        return found
+
+
+@compiled
+def measure_distance(
+    line: Floats, polygon: Floats, room: Floats, out: Singles, n_line: int = 0, n_polygon: int = 0
+) -> None:
+    """Measures from nodes (n_line, n_line) to a polygon, positive inside; has room (2, n_line)."""
 
 
 def _smooth(value: Singles, low: float, high: float) -> Singles:
