@@ -216,19 +216,29 @@ def truncations(
 ) -> Floats:
     """Measures (2, n) how far along slots the walls on right and left are thinner than the tips.
 
-    That is as far as the band beside the slot, as wide as a tip, reaches out of the body.
+    That is as far as the band beside the slot, as wide as a tip, reaches out of the body. Slots of
+    one direction share the band of the deepest: a piece of it that is out of the body reaches as
+    far as its end, or as the slot if that ends within the piece.
     """
-    left = directions[:, ::-1] * [-1.0, 1.0]
+    ways, way = np.unique(directions, axis=0, return_inverse=True)
+    deepest = np.zeros(len(ways))
+    np.maximum.at(deepest, way, depths)
+    left = ways[:, ::-1] * [-1.0, 1.0]
     near, far = settings.slot_width / 2, settings.slot_width / 2 + settings.slots.tip
-    inwards = depths[:, None] * directions
+    inwards = deepest[:, None] * ways
     starts = [np.stack([-side * left, side * left]) + mouth for side in (near, far)]
     rings = np.stack([starts[0], starts[1], starts[1] + inwards, starts[0] + inwards], axis=-2)
     outside = shapely.difference(shapely.polygons(rings).ravel(), body)
-    points, owner = shapely.get_coordinates(outside, return_index=True)
-    along = ((points - mouth) * np.tile(directions, (2, 1))[owner]).sum(axis=-1)
-    cut = np.zeros(len(outside))
-    np.maximum.at(cut, owner, along)
-    return cut.reshape(2, -1)
+    pieces, band = shapely.get_parts(outside, return_index=True)
+    points, piece = shapely.get_coordinates(pieces, return_index=True)
+    along = ((points - mouth) * ways[band[piece] % len(ways)]).sum(axis=-1)
+    begins, ends = np.full(len(pieces), np.inf), np.full(len(pieces), -np.inf)
+    np.minimum.at(begins, piece, along)
+    np.maximum.at(ends, piece, along)
+    side, number = np.divmod(band, len(ways))
+    inside = (number[:, None] == way) & (begins[:, None] < depths)
+    reach = np.where(inside, np.minimum(ends[:, None], depths), 0.0)
+    return np.stack([reach[side == each].max(axis=0, initial=0.0) for each in (0, 1)])
 
 
 def side_truncations(body: Polygon, slot: Slot, settings: Fabrication) -> tuple[float, float]:
