@@ -132,6 +132,13 @@ class Topology:
         turned = motion[..., a, 2] - motion[..., b, 2]
         return np.minimum(void[:, 0] + turned, void[:, 1] - turned)
 
+    def closest_void_angles(self, void: Floats, motion: Floats) -> Floats:
+        """Smallest void angle (n_ligaments,) of each ligament in (n_states, n_units, 3), rad."""
+        turn = np.ascontiguousarray(motion[..., 2].T)
+        a, b = self.ligament_units.T
+        turned = turn[a] - turn[b]
+        return np.minimum(void[:, 0] + turned.min(axis=1), void[:, 1] - turned.max(axis=1))
+
 
 def topology(
     lattice: Lattice,

@@ -99,7 +99,7 @@ class ImplicitSolver:
             return False
         n_units = self.topology.n_units
         stages = record.u[:-1, :, : 3 * n_units].reshape(-1, n_units, 3)
-        closest = self.topology.smallest_void_angles(values.void, stages).min(axis=0)
+        closest = self.topology.closest_void_angles(values.void, stages)
         closest[record.touching] = np.inf
         return bool(closest.min() < law.cutoff_angle)
 

@@ -52,6 +52,8 @@ def test_every_stage_stays_inside_the_barrier() -> None:
     stages = record.u[:-1].reshape(-1, rig.lattice.n_units, 3)
     angles = rig.topology.smallest_void_angles(rig.values.void, stages)
     assert BARRIER < angles.min() < CUTOFF
+    closest = rig.topology.closest_void_angles(rig.values.void, stages)
+    assert (closest == angles.min(axis=0)).all()
 
 
 def test_a_grid_that_is_too_coarse_is_split_where_it_fails() -> None:
