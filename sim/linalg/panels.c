@@ -10,6 +10,9 @@
 #define MULTIPLY_ADD(a, b, c) ((a) * (b) + (c))
 #endif
 
+/* Four numbers of a row, in the register that compilers do not find by themselves. */
+typedef double Row __attribute__((vector_size(32), aligned(8), may_alias));
+
 int64_t panels_entry(const Panels *panels, int64_t row, int64_t column) {
     int64_t panel = column / 4;
     return panels->first[panel] + 4 * (row - 4 * panel) + column % 4;
@@ -101,18 +104,13 @@ void panels_solve(
     for (int64_t panel = n_panels - 1; panel >= 0; panel--) {
         const double *rows = v + first[panel];
         int64_t count = (first[panel + 1] - first[panel]) / 4;
-        double *b = x + 4 * panel, x0 = b[0], x1 = b[1], x2 = b[2], x3 = b[3];
-        for (int64_t i = 4; i < count; i++) {
-            double known = b[i];
-            x0 -= rows[4 * i] * known;
-            x1 -= rows[4 * i + 1] * known;
-            x2 -= rows[4 * i + 2] * known;
-            x3 -= rows[4 * i + 3] * known;
-        }
-        x3 /= rows[15];
-        x2 = (x2 - rows[14] * x3) / rows[10];
-        x1 = (x1 - rows[9] * x2 - rows[13] * x3) / rows[5];
-        x0 = (x0 - rows[4] * x1 - rows[8] * x2 - rows[12] * x3) / rows[0];
+        double *b = x + 4 * panel;
+        Row left = *(Row *)b;
+        for (int64_t i = 4; i < count; i++) left -= ((const Row *)rows)[i] * b[i];
+        double x3 = left[3] / rows[15];
+        double x2 = (left[2] - rows[14] * x3) / rows[10];
+        double x1 = (left[1] - rows[9] * x2 - rows[13] * x3) / rows[5];
+        double x0 = (left[0] - rows[4] * x1 - rows[8] * x2 - rows[12] * x3) / rows[0];
         b[0] = x0, b[1] = x1, b[2] = x2, b[3] = x3;
     }
     memcpy(right, x, sizeof(double) * n);
