@@ -4,6 +4,10 @@
 #include <math.h>
 #include <string.h>
 
+#ifdef __FMA__
+#include <immintrin.h>
+#endif
+
 #ifdef FP_FAST_FMA
 #define MULTIPLY_ADD(a, b, c) fma(a, b, c)
 #else
@@ -13,22 +17,26 @@
 /* Four numbers of a row, in the register that compilers do not find by themselves. */
 typedef double Row __attribute__((vector_size(32), aligned(8), may_alias));
 
+/* Adds share row to a sum, rounded once where that is fast: loops over rows and sums alike are made
+   into shuffles, which take twice as long. */
+static inline void add_product(Row *sum, double share, const Row *row) {
+#ifdef __FMA__
+    *sum = _mm256_fmadd_pd(_mm256_set1_pd(share), *row, *sum);
+#else
+    for (int j = 0; j < 4; j++) (*sum)[j] = MULTIPLY_ADD(share, (*row)[j], (*sum)[j]);
+#endif
+}
+
 int64_t panels_entry(const Panels *panels, int64_t row, int64_t column) {
     int64_t panel = column / 4;
     return panels->first[panel] + 4 * (row - 4 * panel) + column % 4;
 }
 
-static inline void set(double row[4], double a, double b, double c, double d) {
-    row[0] = a, row[1] = b, row[2] = c, row[3] = d;
-}
-
 /* Replaces a row t by share t + s F, with the row s and the matrix F, rows first. */
-static inline void add_row_product(double *t, double share, const double *s, double F[4][4]) {
-    double total[4];
-    for (int j = 0; j < 4; j++) total[j] = share * t[j];
-    for (int i = 0; i < 4; i++)
-        for (int j = 0; j < 4; j++) total[j] = MULTIPLY_ADD(s[i], F[i][j], total[j]);
-    for (int j = 0; j < 4; j++) t[j] = total[j];
+static inline void add_row_product(double *t, double share, const double *s, const Row F[4]) {
+    Row total = share * *(Row *)t;
+    for (int i = 0; i < 4; i++) add_product(&total, s[i], F + i);
+    *(Row *)t = total;
 }
 
 void panels_fill_padding(double *values, int64_t n, const Panels *panels) {
@@ -53,21 +61,21 @@ static inline bool factorise_block(double *v) {
     return true;
 }
 
-static inline void inverse_transposed(const double *v, double F[4][4]) {
+static inline void inverse_transposed(const double *v, Row F[4]) {
     double d0 = 1.0 / v[0], d1 = 1.0 / v[5], d2 = 1.0 / v[10], d3 = 1.0 / v[15];
     double m10 = -v[4] * d0 * d1, m21 = -v[9] * d1 * d2, m32 = -v[14] * d2 * d3;
     double m20 = -(v[8] * d0 + v[9] * m10) * d2;
     double m31 = -(v[13] * d1 + v[14] * m21) * d3;
     double m30 = -(v[12] * d0 + v[13] * m10 + v[14] * m20) * d3;
-    set(F[0], d0, m10, m20, m30);
-    set(F[1], 0.0, d1, m21, m31);
-    set(F[2], 0.0, 0.0, d2, m32);
-    set(F[3], 0.0, 0.0, 0.0, d3);
+    F[0] = (Row){d0, m10, m20, m30};
+    F[1] = (Row){0.0, d1, m21, m31};
+    F[2] = (Row){0.0, 0.0, d2, m32};
+    F[3] = (Row){0.0, 0.0, 0.0, d3};
 }
 
 bool panels_factorise(double *v, const Panels *panels) {
     const int64_t *first = panels->first, n_panels = panels->n_first - 1;
-    double F[4][4];
+    Row F[4];
     for (int64_t panel = 0; panel < n_panels; panel++) {
         int64_t at = first[panel], end = first[panel + 1];
         if (!factorise_block(v + at)) return false;
@@ -75,7 +83,7 @@ bool panels_factorise(double *v, const Panels *panels) {
         for (int64_t row = at + 16; row < end; row += 4) add_row_product(v + row, 0.0, v + row, F);
         for (int64_t b = at + 16; b < end; b += 16) {  /* four rows that are columns of a later panel */
             for (int c = 0; c < 4; c++)
-                set(F[c], -v[b + c], -v[b + c + 4], -v[b + c + 8], -v[b + c + 12]);
+                F[c] = (Row){-v[b + c], -v[b + c + 4], -v[b + c + 8], -v[b + c + 12]};
             double *target = v + first[panel + (b - at) / 16] - b;
             for (int64_t row = b; row < end; row += 4) add_row_product(target + row, 1.0, v + row, F);
         }
