@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.harness import Method, Run, Sample, Task, settings_of
 from benchmarks.scenes import LoadCase, case, counted, work_of
 from sim.core import Floats
-from sim.linalg import OF_EQUILIBRIA, Storage
+from sim.linalg import PINNED, Storage
 from sim.quasistatics import StaticSolver
 from sim.scene import STIFFENING, GradientChain, ParameterMap, make_plan
 from sim.solvers import Solver, solve_cases
@@ -52,7 +52,7 @@ def at_rest(name: str, tolerances: tuple[float, ...]) -> tuple[Method, ...]:
             partial(_prepare, name, partial(_static, way)),
             settings_of(tolerances),
         )
-        for way in OF_EQUILIBRIA
+        for way in PINNED
     )
 
 

@@ -21,7 +21,7 @@ from benchmarks.harness import (
 )
 from benchmarks.scenes import HEAVY, work_of
 from sim.energy import Topology, observe, topology
-from sim.linalg import OF_EQUILIBRIA, Storage
+from sim.linalg import FASTEST, Storage
 from sim.quasistatics import StaticSolver
 from sim.solvers import LinearRamp, PrescribedMotion, concrete, held_dofs, solve_case
 from sim.structure import ConcreteParameters, VoidAngleContact, parameters_at, quads
@@ -114,10 +114,10 @@ def strict(sides: tuple[int, ...]) -> Run:
 
 def grown(way: str, side: float, _: str) -> Run:
     """Prepares one size by one of the WAYS."""
-    return _solve(int(side), OF_EQUILIBRIA if way == "Newton, by size" else ("band",))
+    return _solve(int(side), FASTEST if way == "Newton, by size" else ("band",))
 
 
-def _solve(side: int, storages: tuple[Storage, ...] = OF_EQUILIBRIA) -> Run:
+def _solve(side: int, storages: tuple[Storage, ...] = FASTEST) -> Run:
     top, values, drive = _posed(side)
     solver = StaticSolver(replace(top, storages=storages), np.ones(1))
 

@@ -10,7 +10,7 @@ import numpy as np
 from sim.collision import CandidatePairs, find_candidate_pairs
 from sim.core import Floats, Ints
 from sim.energy.network_arrays import NetworkArrays
-from sim.linalg import OF_EQUILIBRIA, Pattern, Storage, block_entries, number_free_dofs
+from sim.linalg import PINNED, Pattern, Storage, block_entries, number_free_dofs
 from sim.structure import (
     ConcreteParameters,
     ContactModel,
@@ -33,7 +33,7 @@ class Topology:
     rotation_scale: float  # length that makes rotations comparable with displacements, mm
     contact: VoidAngleContact | CandidatePairs  # law, or what the law on distances acts on
     loaded: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # (n_loaded,) units
-    storages: tuple[Storage, ...] = OF_EQUILIBRIA  # of the tangent, to choose from
+    storages: tuple[Storage, ...] = PINNED  # of the tangent, to choose from
 
     @cached_property
     def numbering(self) -> tuple[Ints, Pattern]:

@@ -1,5 +1,5 @@
-from .symmetric import OF_EQUILIBRIA as OF_EQUILIBRIA
-from .symmetric import OF_MOTIONS as OF_MOTIONS
+from .symmetric import FASTEST as FASTEST
+from .symmetric import PINNED as PINNED
 from .symmetric import Matrix as Matrix
 from .symmetric import Pattern as Pattern
 from .symmetric import Storage as Storage

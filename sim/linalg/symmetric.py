@@ -13,15 +13,16 @@ from sim.linalg import lapack  # noqa: F401  (hands its routines over)
 from sim.linalg.nested_dissection import Fronts, dissect, fronts_of, no_fronts
 from sim.linalg.panels import WIDTH, Panels, no_panels, panels_of, reach_of
 
-NARROW_FLOP, BAND_FLOP, FRONT_FLOP, FRONT_CALL, PANEL_FLOP = 72e-12, 42e-12, 58e-12, 2e-6, 47e-12
+NARROW_FLOP, BAND_FLOP, FRONT_FLOP, FRONT_CALL, PANEL_FLOP = 72e-12, 42e-12, 58e-12, 2e-6, 38e-12
 """Seconds of one core for a multiplication of each method, and for a front's calls."""
 
 Storage = Literal["band", "panels", "fronts"]
 
-OF_EQUILIBRIA: tuple[Storage, ...] = ("band", "fronts")
-"""Storages that equilibria choose from. Panels would be as fast as in motions; but designs of
-equilibria are pinned to the last bit, and each way to solve rounds in its own way."""
-OF_MOTIONS: tuple[Storage, ...] = ("panels", "fronts")
+FASTEST: tuple[Storage, ...] = ("panels", "fronts")
+"""Storages to choose from."""
+PINNED: tuple[Storage, ...] = ("band", "fronts")
+"""Those that designs of equilibria choose from, which are pinned to the last bit: each way to solve
+rounds in its own way."""
 
 BY_FRONTS, BY_PANELS = -1, -2
 
@@ -75,7 +76,7 @@ class Matrix(NamedTuple):
 
 
 def number_free_dofs(
-    site: Floats, pairs: Ints, held: Ints, storages: tuple[Storage, ...] = OF_EQUILIBRIA
+    site: Floats, pairs: Ints, held: Ints, storages: tuple[Storage, ...] = PINNED
 ) -> tuple[Ints, Pattern]:
     """Numbers the dofs that are not held, in the order in which the tangent is solved fastest.
 

@@ -6,6 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from sim.core import Floats, Ints
+from sim.linalg import FASTEST, PINNED
 from sim.quasistatics import StaticSolver
 from sim.scene.equal_cases import equal_cases
 from sim.scene.parameter_map import concrete_parameters
@@ -78,8 +79,8 @@ def make_plan(
         times: (n_times,) of the output, s; None for the loss's own samples.
         threads: cores to use: for cases side by side, and for the tangent of a large lattice.
         every_case: whether the motion of each load case is wanted, and not its loss alone.
-        gradient: whether derivatives are wanted; without, stages are solved as motions need it, and
-            a path goes on where units meet.
+        gradient: whether derivatives are wanted; without, stages are solved as motions need it, a
+            path goes on where units meet, and its tangent is stored as is fastest.
 
     Raises:
         SimulationError: nothing can move, or no two units are joined.
@@ -108,8 +109,10 @@ def make_plan(
     solver: Solver
     if scene.loads.static:
         integrator: Literal["static", "implicit", "explicit"] = "static"
-        solver = StaticSolver(scene.topology, times, threads=threads, continues=not gradient)
-        decisions.append(f"tangent: {scene.topology.numbering[1].describe()}")
+        storages = PINNED if gradient else FASTEST
+        top = replace(scene.topology, storages=storages)
+        solver = StaticSolver(top, times, threads=threads, continues=not gradient)
+        decisions.append(f"tangent: {top.numbering[1].describe()}")
         skipped.append("inertia and damping: the scene is static")
     else:
         solver = time_solver(scene, values, times, threads, decisions, warnings, gradient)

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse.linalg as spla
 
 from sim.core import Floats, SimulationError
-from sim.linalg import OF_MOTIONS
+from sim.linalg import FASTEST
 from sim.scene.scene import DIRECTED, Accuracy, Scene
 from sim.solvers import (
     PrescribedMotion,
@@ -323,7 +323,7 @@ def _first_grid(
     drives = different_drives(scene)
     stops = _breakpoints(drives, end)
     solver = ImplicitSolver(
-        replace(scene.topology, storages=OF_MOTIONS), steps, times, NEWTON, threads,
+        replace(scene.topology, storages=FASTEST), steps, times, NEWTON, threads,
         turn_allowance=TURN_ALLOWANCE,
     )  # fmt: skip
     if frequency is not None:

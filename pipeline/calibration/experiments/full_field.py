@@ -23,7 +23,7 @@ from pipeline.datasets.tables import TABLES
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints, Numbers
 from sim.energy import topology
-from sim.linalg import OF_MOTIONS
+from sim.linalg import FASTEST
 from sim.quasistatics import StaticSolver
 from sim.scene import TURN_ALLOWANCE, Scene
 from sim.solvers import PrescribedMotion
@@ -237,5 +237,5 @@ def _solver(driven: Scene, asked: Floats, knots: int) -> AnySolver:
     if driven.loads.static:
         return StaticSolver(whole, asked, relative=TOLERANCE)
     steps = np.linspace(0.0, driven.loads.duration, STEPS * (knots - 1) + 1)
-    whole = replace(whole, storages=OF_MOTIONS)
+    whole = replace(whole, storages=FASTEST)
     return ImplicitSolver(whole, steps, asked, STAGES, turn_allowance=TURN_ALLOWANCE)

@@ -6,8 +6,8 @@ import scipy.sparse as sp
 
 from sim.core import Floats, Ints
 from sim.linalg import (
-    OF_EQUILIBRIA,
-    OF_MOTIONS,
+    FASTEST,
+    PINNED,
     Matrix,
     Pattern,
     Storage,
@@ -187,8 +187,8 @@ def test_every_dof_is_numbered_once(storage: Storage) -> None:
 
 @pytest.mark.parametrize(
     ("storages", "wanted"),
-    [(OF_EQUILIBRIA, ["band", "fronts"]), (OF_MOTIONS, ["panels", "fronts"])],
-    ids=["equilibria", "motions"],
+    [(PINNED, ["band", "fronts"]), (FASTEST, ["panels", "fronts"])],
+    ids=["pinned", "fastest"],
 )
 def test_fronts_are_chosen_where_they_are_faster(
     storages: tuple[Storage, ...], wanted: list[Storage]
