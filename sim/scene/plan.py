@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from sim.core import Floats, Ints
-from sim.linalg import FASTEST, PINNED
+from sim.linalg import FASTEST
 from sim.quasistatics import StaticSolver
 from sim.scene.equal_cases import equal_cases
 from sim.scene.parameter_map import concrete_parameters
@@ -109,8 +109,7 @@ def make_plan(
     solver: Solver
     if scene.loads.static:
         integrator: Literal["static", "implicit", "explicit"] = "static"
-        storages = PINNED if gradient else FASTEST
-        top = replace(scene.topology, storages=storages)
+        top = scene.topology if gradient else replace(scene.topology, storages=FASTEST)
         solver = StaticSolver(top, times, threads=threads, continues=not gradient)
         decisions.append(f"tangent: {top.numbering[1].describe()}")
         skipped.append("inertia and damping: the scene is static")
