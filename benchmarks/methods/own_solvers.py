@@ -3,13 +3,14 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from typing import get_args
 
 import numpy as np
 
 from benchmarks.harness import Method, Run, Sample, Task, settings_of
 from benchmarks.scenes import LoadCase, case, counted, work_of
 from sim.core import Floats
-from sim.linalg import PINNED, Storage
+from sim.linalg import Storage
 from sim.quasistatics import StaticSolver
 from sim.scene import STIFFENING, GradientChain, ParameterMap, make_plan
 from sim.solvers import Solver, solve_cases
@@ -30,7 +31,7 @@ HALVING = 8.0
 
 
 def in_time(name: str, halvings: int) -> tuple[Method, ...]:
-    """Lists the implicit method with either way to solve, and the explicit methods."""
+    """Lists the implicit method with two ways to solve, and the explicit methods."""
     implicit = tuple(("steps / " + str(2**k) if k else "default", k) for k in range(halvings + 1))
     explicit = tuple((f"{2**k} × stable" if k else "stable", k) for k in range(halvings - 1))
     makes: dict[str, tuple[Make, tuple[tuple[str, float], ...]]] = {
@@ -45,14 +46,14 @@ def in_time(name: str, halvings: int) -> tuple[Method, ...]:
 
 
 def at_rest(name: str, tolerances: tuple[float, ...]) -> tuple[Method, ...]:
-    """Lists Newton's method along the path, with either way to solve."""
+    """Lists Newton's method along the path, with every way to solve."""
     return tuple(
         Method(
             f"Newton, {way}",
             partial(_prepare, name, partial(_static, way)),
             settings_of(tolerances),
         )
-        for way in PINNED
+        for way in get_args(Storage)
     )
 
 

@@ -20,12 +20,13 @@ class Mark(NamedTuple):
 
 _EXPLICIT = style.METHOD_COLOURS["mma"]
 MARKS = {
-    "ESDIRK3, band": Mark(style.CLOAKED, "o"),
+    "ESDIRK3, panels": Mark(style.CLOAKED, "o"),
     "ESDIRK3, fronts": Mark(style.CLOAKED, "o", filled=False),
     "explicit leapfrog": Mark(_EXPLICIT, "s"),
     "explicit Blanes-Moan": Mark(_EXPLICIT, "D"),
     "Newton, by size": Mark(style.METHOD_COLOURS["mma"], "s"),
     "Newton, band": Mark(style.CLOAKED, "o"),
+    "Newton, panels": Mark(style.CLOAKED, "D"),
     "Newton, fronts": Mark(style.CLOAKED, "o", filled=False),
     "central differences": Mark(style.CLOAKED, "P"),
     "diffrax Tsit5": Mark(DIFFRAX, "^"),

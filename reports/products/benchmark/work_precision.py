@@ -22,7 +22,7 @@ ROUNDING = 1e-16
 _COLUMNS, _LINE = 4, 3.6
 _LEFT, _TOP, _WIDE, _HIGH, _PITCH = 12.0, 9.0, 45.0, 45.0, 58.0
 _SCENES, _TALL = 3, 42.0
-_PLAIN = {"central differences": ("ESDIRK3, band", "Newton, band")}
+PLAIN = {"central differences": ("ESDIRK3, panels", "Newton, band")}
 """Methods without a loss of their own, and those that they take it from."""
 
 
@@ -79,7 +79,7 @@ def draw_gradients(scenes: Mapping[str, xr.Dataset]) -> Figure:
 def _costs(axes: Axes, data: xr.Dataset) -> None:
     losses = dict(list(tables.measured(data, "loss").groupby("method")))
     for method, found in tables.measured(data, "gradient").groupby("method", sort=False):
-        plain = [losses[name] for name in (method, *_PLAIN.get(str(method), ())) if name in losses]
+        plain = [losses[name] for name in (method, *PLAIN.get(str(method), ())) if name in losses]
         if plain:  # the loss at that setting, or at the first
             known = plain[0].set_index("setting")["time, s"]
             loss = found["setting"].map(known).fillna(known.iloc[0])

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from benchmarks.methods import selection
+from benchmarks.scenes import TITLES
 from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.datasets.tables import Kind
 from reports.__main__ import main
 from reports.base import style
-from reports.products.benchmark import charts, optimisers, tables, work_precision
+from reports.products.benchmark import charts, marks, optimisers, tables, work_precision
 
 MACHINE = {"processor": "abacus", "cores": 2, "date": "2026-01-01T00:00:00"}
 MACHINE |= {"commit": "0123456789abcdef"}
@@ -47,7 +49,7 @@ def points(rows: list[tuple[str, str, str, int, float, float, str]]) -> xr.Datas
 def precisions() -> xr.Dataset:
     rows = [
         (method, f"{10.0**-k:g}", task, 25, base * 2.0**k, 10.0**-k, "measured")
-        for method, base in (("ESDIRK3, band", 0.01), ("scipy Radau", 0.4))
+        for method, base in (("ESDIRK3, panels", 0.01), ("scipy Radau", 0.4))
         for k in (2, 4, 6)
         for task in ("loss", "gradient")
     ]
@@ -167,3 +169,18 @@ def test_exponents_and_profiles() -> None:
     assert np.isnan(charts.exponent(units[:2], np.ones(2), 900))
     needed = optimisers.costs({"small": contest()})
     assert needed == {"own sqp": [3.0, 3.0, 3.0], "scipy SLSQP": [3.0, np.inf, np.inf]}
+
+
+@pytest.mark.parametrize("scene", TITLES)
+def test_every_method_of_a_scene_is_drawn_in_its_own_way(scene: str) -> None:
+    methods = [method.name for method in selection.methods(scene)]
+    assert set(methods) <= marks.MARKS.keys()
+    assert len({marks.mark(method) for method in methods}) == len(methods)
+
+
+@pytest.mark.parametrize("scene", selection.BY_DIFFERENCES)
+def test_a_gradient_by_differences_has_a_loss_beside_it(scene: str) -> None:
+    methods = {method.name for method in selection.methods(scene)}
+    for method, losses in work_precision.PLAIN.items():
+        assert method in methods
+        assert methods & set(losses)
