@@ -1,6 +1,8 @@
 """Writes frames as a video: the same frames give the same bytes."""
 
+from collections import deque
 from collections.abc import Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from pipeline.runtime import write_atomically
 from sim.core import Image
 
 _TICKS = 90000  # per second: a usual clock of containers
+_BEHIND = 4  # frames that wait for the encoder at most
 
 
 def encode_video(
@@ -34,17 +37,30 @@ def encode_video(
 def _write(
     container: av.container.OutputContainer, images: Iterable[Image], rate: float, codec: Codec
 ) -> None:
-    stream = None
-    for index, image in enumerate(images):
-        lossless = codec.name == "ffv1"
-        planes = image if lossless else _planes(image)
-        if stream is None:
-            stream = _stream(container, planes, rate, codec)
-        frame = av.VideoFrame.from_ndarray(planes, format="gray" if lossless else "yuv420p")
-        frame.pts, frame.time_base = round(index * _TICKS / rate), Fraction(1, _TICKS)
-        container.mux(stream.encode(frame))
+    """Encodes images in a thread of its own while the next ones are made."""
+    lossless, stream = codec.name == "ffv1", None
+    waiting: deque[Future[None]] = deque()
+    with ThreadPoolExecutor(1) as thread:
+        for index, image in enumerate(images):
+            planes = image if lossless else _planes(image)
+            if stream is None:
+                stream = _stream(container, planes, rate, codec)
+            frame = av.VideoFrame.from_ndarray(planes, format="gray" if lossless else "yuv420p")
+            frame.pts, frame.time_base = round(index * _TICKS / rate), Fraction(1, _TICKS)
+            waiting.append(thread.submit(_encode, container, stream, frame))
+            if len(waiting) > _BEHIND:
+                waiting.popleft().result()
+        for each in waiting:
+            each.result()
     if stream is not None:
-        container.mux(stream.encode(None))
+        _encode(container, stream, None)
+
+
+def _encode(
+    container: av.container.OutputContainer, stream: av.VideoStream, frame: av.VideoFrame | None
+) -> None:
+    """Writes what the encoder has ready after a frame, or all that is left after the last one."""
+    container.mux(stream.encode(frame))
 
 
 def _planes(image: Image) -> Image:
