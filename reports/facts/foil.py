@@ -21,9 +21,10 @@ from reports.study import display_name
 from sim.core import Floats
 from sim.energy import counted_from_rest
 from sim.scene import foil_strains
-from sim.structure import Lattice, Material, Parameters, parameters_at, shape
+from sim.structure import Lattice, Material, Parameters, arrays_of, parameters_at, shape
 
 _told = facts_of(__file__)
+_counted_from_rest = jax.jit(counted_from_rest)
 _strains = jax.jit(foil_strains, static_argnames="thickness")
 
 
@@ -107,7 +108,7 @@ def _parameters_at_rest(
     arms = (np.asarray(each.arm)[lattice.first_vertex[:-1]] @ (1.0, 1j) for each in (before, after))
     turn = np.angle(np.conj(next(arms)) * next(arms))
     motion = jnp.column_stack([after.centroid - before.centroid, turn])
-    return counted_from_rest(lattice, parameters_at(lattice, drawn, material), motion)
+    return _counted_from_rest(arrays_of(lattice), parameters_at(lattice, drawn, material), motion)
 
 
 def _extremes(ends: Floats, values: Parameters[jax.Array], thickness: float) -> ShimExtremes:

@@ -8,7 +8,7 @@ from jax import Array
 
 from sim.core import Numbers
 from sim.energy.ligament import ligament_strain
-from sim.structure import Lattice, Parameters
+from sim.structure import Lattice, LatticeArrays, Parameters
 
 
 class RestState(NamedTuple):
@@ -22,7 +22,9 @@ class RestState(NamedTuple):
     natural: Array
 
 
-def rest_state(lattice: Lattice, values: Parameters[Any], motion: Numbers) -> RestState:
+def rest_state(
+    lattice: Lattice | LatticeArrays, values: Parameters[Any], motion: Numbers
+) -> RestState:
     """Moves units as rigid bodies, and tells ligaments' natural states from their new vectors.
 
     So energies and forces of a motion from there are those of the motion before and from there. The
@@ -38,7 +40,7 @@ def rest_state(lattice: Lattice, values: Parameters[Any], motion: Numbers) -> Re
     vertices = values.centroid[lattice.unit] + motion[lattice.unit, :2] + turned
     first, second = lattice.ligaments.T
     vector = vertices[second] - vertices[first]
-    ends: Array = motion[lattice.ligament_units]
+    ends: Array = motion[lattice.unit[lattice.ligaments]]
     strain = jax.vmap(ligament_strain)(
         ends[:, 0], ends[:, 1], values.arm[:, 0], values.arm[:, 1], values.vector
     )
@@ -49,7 +51,7 @@ def rest_state(lattice: Lattice, values: Parameters[Any], motion: Numbers) -> Re
 
 
 def counted_from_rest(
-    lattice: Lattice, values: Parameters[Array], motion: Array
+    lattice: Lattice | LatticeArrays, values: Parameters[Array], motion: Array
 ) -> Parameters[Array]:
     """Derives the parameters of a structure as it rests; arguments of `rest_state`."""
     rest, unit = rest_state(lattice, values, motion), lattice.unit
@@ -66,8 +68,8 @@ def counted_from_rest(
     )
 
 
-def _opened(lattice: Lattice, motion: Array) -> Array:
+def _opened(lattice: Lattice | LatticeArrays, motion: Array) -> Array:
     """Computes by how much void angles (n_ligaments, 2) grow, rad; see `void_angles`."""
-    a, b = lattice.ligament_units.T
+    a, b = lattice.unit[lattice.ligaments].T
     more = motion[a, 2] - motion[b, 2]
     return jnp.stack([more, -more], axis=1)

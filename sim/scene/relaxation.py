@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import NamedTuple
 
+import jax
 import numpy as np
 
 from sim.core import Floats
@@ -10,6 +11,10 @@ from sim.energy import RestState, rest_state
 from sim.scene.parameter_map import concrete_parameters, rest_motion
 from sim.scene.scene import Scene
 from sim.scene.simulation import simulate
+from sim.structure import arrays_of
+
+_rest_state = jax.jit(rest_state)
+"""Compiles all at once: that is sooner done than each operation by itself."""
 
 
 class Relaxed(NamedTuple):
@@ -42,7 +47,7 @@ def relaxed(scene: Scene, vertices: Floats | None = None) -> Relaxed:
     network = scene.lattice.vertices if vertices is None else vertices
     values = concrete_parameters(scene, network)
     motion = np.asarray(rest_motion(scene, values))
-    rest = rest_state(scene.lattice, values, motion)
+    rest = _rest_state(arrays_of(scene.lattice), values, motion)
     return Relaxed(_counted_from(scene, rest), np.asarray(rest.vertices), motion)
 
 
