@@ -17,7 +17,10 @@ INSET = 1e-7
 """The projection aims this far inside (mm), so that rounding leaves no constraint violated."""
 
 PATIENCE = 3
-"""Rounds in which a projection gets half the way to the feasible set, unless it leads nowhere."""
+"""Rounds in which a projection gets half the way to the feasible set, unless it leads nowhere.
+
+They are counted anew where a margin comes in sight, which was infinite, as loads beyond a snap are.
+"""
 
 RETREAT_STEPS = 10
 """Number of steps in which a retreat deepens."""
@@ -41,8 +44,10 @@ def project(
     """
     missing: list[float] = []
     try:
-        place = problem.place(np.clip(x, problem.lower, problem.upper))
+        before = place = problem.place(np.clip(x, problem.lower, problem.upper))
         for _ in range(rounds):
+            if _comes_in_sight(before, place):
+                missing.clear()
             missing.append(depth - float(place.values.min(initial=np.inf)))
             if missing[-1] <= 0.0:
                 return place
@@ -51,10 +56,16 @@ def project(
             step = _newton(problem, place, reach, depth + INSET)
             if step is None:
                 return None
-            place = problem.place(np.clip(place.x + step, problem.lower, problem.upper))
+            ahead = np.clip(place.x + step, problem.lower, problem.upper)
+            before, place = place, problem.place(ahead)
     except SimulationError:
         return None
     return place if place.values.min(initial=np.inf) >= depth else None
+
+
+def _comes_in_sight(before: ConstraintPoint, place: ConstraintPoint) -> bool:
+    """Tells whether the worst margin of a place was infinite at the place before."""
+    return len(place.values) > 0 and bool(np.isinf(before.values[place.values.argmin()]))
 
 
 def _newton(

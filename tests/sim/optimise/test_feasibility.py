@@ -22,6 +22,20 @@ def test_a_projection_that_leads_nowhere_is_given_up() -> None:
     assert len(asked) == 4
 
 
+def test_what_comes_in_sight_on_the_way_has_rounds_of_its_own() -> None:
+    """As the second snap of a path, far from its limit, once the first one is none any more."""
+
+    def constrain(x: Floats) -> tuple[Floats, Floats]:
+        first, ahead = x[0] - 0.5, 1.0 - x[1]
+        known = first >= 0.0
+        second = 100.0 * (1e-3 - ahead**2) if known else np.inf
+        return np.array([first, second]), np.diag([1.0, 200.0 * ahead * known])
+
+    found = feasible_design(constrain, np.zeros(2), 1.0, 20)
+    assert found is not None
+    assert found == pytest.approx([0.5, 1.0 - np.sqrt(1e-3)], abs=1e-4)
+
+
 def test_a_design_outside_is_moved_to_the_nearest_one_inside() -> None:
     def outside_of_a_circle(x: Floats) -> tuple[Floats, Floats]:
         return np.array([x @ x - 4.0]), 2.0 * x[None]
