@@ -39,8 +39,8 @@ def project(
     """Finds a design near ``x`` with every margin at least ``depth``; None if no round does.
 
     Each round is a shortest Newton step for the linearised constraints and changes no variable by
-    more than ``reach``. The worst margin must come half the way in any ``patience`` rounds. A
-    design whose constraints cannot be evaluated is none.
+    more than ``reach``. The worst margin must come half the way in any ``patience`` rounds, unless
+    it has come in sight in them. A design whose constraints cannot be evaluated is none.
     """
     missing: list[float] = []
     try:
