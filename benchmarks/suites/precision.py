@@ -24,7 +24,7 @@ AUTHORS_NOTE = (
     "stored results (tests/data/reference), their gradient good to 1e-5: an independent check of"
     " the reference solution"
 )
-STEPS = (("leapfrog", 20_000), ("leapfrog", 40_000), ("Blanes-Moan", 12_000))
+STEPS = (("leapfrog", 25_000), ("leapfrog", 40_000), ("Blanes-Moan", 15_000))
 
 
 def suite() -> Suite:

@@ -118,6 +118,7 @@ def test_the_picture_shows_the_tables_whole() -> None:
         left, right = figure(found).axes
     ends = [bar.get_path().get_extents(bar.get_transform()) for bar in left.patches]
     times = left.transData.inverted().transform([[end.x1, end.y1] for end in ends])[:, 0]
-    np.testing.assert_allclose(times, [36.6, 0.0161, 434.0, 0.161, 0.335])
+    beside = [*reversed(found["fig4"][:2]), *reversed(found["fig2"][:3])]
+    np.testing.assert_allclose(times, [row.time for row in beside])
     shown = np.concatenate([np.asarray(line.get_xydata()) for line in right.lines])
     assert set(map(tuple, shown)) == {(row.time, row.error) for row in found["precision"]}
