@@ -27,6 +27,17 @@ settings.register_profile(
 )
 settings.load_profile("suite")
 
+# On Linux all threads share two arenas, and what is freed goes back to the system: else each thread
+# keeps free memory of its own, and workers grow by a fifth. Numbers of mallopt(3).
+_ARENA_MAX, _MMAP_THRESHOLD, _TRIM_THRESHOLD = -8, -3, -1
+if sys.platform == "linux" and hasattr(ctypes.CDLL(None), "mallopt"):
+    for parameter, value in (
+        (_ARENA_MAX, 2),
+        (_MMAP_THRESHOLD, 1 << 20),
+        (_TRIM_THRESHOLD, 16 << 20),
+    ):
+        ctypes.CDLL(None).mallopt(parameter, value)
+
 LARGE, GROWTH = 700 << 20, 150 << 20
 """Bytes from which a process drops what JAX has compiled, and by which it has to grow till then."""
 _process, _kept = psutil.Process(), [0]
