@@ -126,9 +126,12 @@ def unit_solid(unit: Unit, settings: Fabrication) -> PrintedPart:
     """Stacks a unit with its id and arrow sunk into the underside, and with its tracking dots."""
     height, outline, sunk = unit.height, unit.outline, settings.labels.depth
     marks, dots = settings.markers, discs(unit.markers)
-    base = outline.difference(_lettering(unit, settings))
     inset = settings.print.first_layer_inset
-    first = base.intersection(outline.buffer(-inset, join_style="mitre")) if inset else base
+    inner = outline.buffer(-inset, join_style="mitre") if inset else outline
+    lettering = _lettering(unit, inner, settings)
+    while _is_pinched(base := outline.difference(lettering)):
+        lettering = engraved_area(lettering)
+    first = inner.difference(lettering)
     split = min(settings.print.layer, sunk)
     layers = [Layer(solid_area(first), 0.0, split), Layer(solid_area(base), split, sunk)]
     if marks.kind == "recess":
@@ -141,11 +144,22 @@ def unit_solid(unit: Unit, settings: Fabrication) -> PrintedPart:
     return PrintedPart(unit.label, tuple(layer for layer in layers if layer.top > layer.bottom))
 
 
-def _lettering(unit: Unit, settings: Fabrication) -> BaseGeometry:
-    """Covers the letters and the mark on a unit's underside; small letters have thinner strokes."""
+def _is_pinched(area: BaseGeometry) -> bool:
+    """Tests that rings of an area meet in a point, so that a mesh of it is not closed there."""
+    parts = (part for part in shapely.get_parts(area) if isinstance(part, Polygon))
+    rings = np.array([ring for part in parts for ring in (part.exterior, *part.interiors)])
+    one, other = np.triu_indices(len(rings), 1)
+    return bool((shapely.distance(rings[one], rings[other]) < _RESOLVED).any())
+
+
+def _lettering(unit: Unit, within: BaseGeometry, settings: Fabrication) -> BaseGeometry:
+    """Covers the letters and the mark on a unit's underside, up to a rim `within` an area.
+
+    Small letters have thinner strokes.
+    """
     x0, y0, x1, y1 = shapely.total_bounds([LineString(stroke) for stroke in unit.underside])
     width = min(settings.labels.stroke, max(0.3, 0.2 * min(x1 - x0, y1 - y0)))
     mark = pen_area(unit.mark, min(settings.labels.stroke, 0.4))
     letters = pen_area(unit.underside, float(width)).union(mark)
-    rim = unit.outline.buffer(-_RIM, join_style="mitre")  # also keeps nearly equal vertices apart
-    return engraved_area(shapely.set_precision(letters.intersection(rim), _GRID))
+    room = within.buffer(-_RIM, join_style="mitre")  # also keeps nearly equal vertices apart
+    return engraved_area(shapely.set_precision(letters.intersection(room), _GRID))

@@ -1,6 +1,7 @@
 """Every way in which a mesh can be wrong is made in a file, and found there."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,14 @@ from shapely import Polygon
 
 from pipeline.fabrication.checks.print_folder import check_plate
 from pipeline.fabrication.checks.slot_checks import UnitSection, check_section
-from pipeline.fabrication.parts import Unit
+from pipeline.fabrication.parts import Unit, unit_solid
 from pipeline.fabrication.readback import check_solid, check_volume, read_3mf, read_stl
-from pipeline.problem.sections import Print
+from pipeline.fabrication.units import build_specimen, network
+from pipeline.problem.fields import SIM_UNITS
+from pipeline.problem.sections import Fabrication, Print
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints
-from tests.pipeline.fabrication import handmade
+from tests.pipeline.fabrication import built, handmade
 from tests.pipeline.fabrication.files import write_3mf, write_stl
 from tests.pipeline.fabrication.handmade import ASKED
 from tests.tables import cases
@@ -198,3 +201,17 @@ def test_a_broken_plate_is_caught_and_what_is_no_plate_refused(tmp_path: Path) -
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(UserError, match="cannot be read back"):
         read_3mf(path)
+
+
+@pytest.mark.parametrize("inset", ["0 mm", "0.25 mm", "0.4 mm"])
+def test_letters_that_reach_the_rim_leave_a_solid(tmp_path: Path, inset: str) -> None:
+    """Letters far too large, cut by a first layer that is drawn in."""
+    given = {"print": {"first_layer_inset": inset}}
+    asked = Fabrication.model_validate(given, context=SIM_UNITS)
+    net = network(built.design(), "cloaked")
+    for made in build_specimen(net, asked, ("toy", "cloaked"), tmp_path).units:
+        middle = np.array(made.outline.centroid.coords[0])
+        large = tuple(middle + 2.5 * (stroke - middle) for stroke in made.underside)
+        mesh = unit_solid(replace(made, underside=large), asked).mesh
+        write_stl(tmp_path / "unit.stl", mesh.vertices, mesh.faces)
+        assert list(check_solid(read_stl(tmp_path / "unit.stl"))) == []
