@@ -43,6 +43,10 @@ REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
     "shaken beyond": (scene(sim.Harmonic(90.0, 10.0), **MOVING), "90 mm", "drive.amplitude"),
     "no supports": (scene(supports=()), "moves along as one; clamp", "supports"),
     "supports across": (scene(supports=(sim.Clamp(LEFT, ("uy",)),)), "moves along", "supports"),
+    "supports across, by a sine": (
+        scene(sim.LinearRamp(3.0, 1.0, np.pi), supports=(sim.Clamp(LEFT, ("uy",)),)),
+        "moves along", "supports",
+    ),
     "plates that slide": (  # on a rail at the left, and freely along the right edge
         scene(
             supports=(sim.Clamp(LEFT, ("ux", "theta")),),
