@@ -154,6 +154,7 @@ _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     load_checks.horizon,
     load_checks.ramps_end,
     load_checks.drive_comes,
+    load_checks.samples,
     _robust,
     load_checks.reaction,
     load_checks.loads_in_ranges,

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import atan2, hypot, isclose
+from math import atan2, ceil, hypot, isclose
 
 from pipeline.problem import Problem
 from pipeline.problem.reading.fault import Findings, ProblemFault
@@ -22,6 +22,11 @@ from pipeline.problem.sections import (
     selected_units,
     single_drives,
 )
+
+LEAST_SAMPLES = 6
+"""Instants in a period of a load, of loss and response: of fewer these show something else."""
+
+_HAIR = 1e-9
 
 _ALIKE = 1e-6
 """Relative difference up to which a value is the drive's: that of a mixture has no end."""
@@ -149,6 +154,28 @@ def drive_comes(problem: Problem) -> Findings:
         if (begin := getattr(drive, "delay", 0.0) - grows) > end:
             what = f"the drive comes at {begin:g} s, after the horizon, which ends at {end:g} s"
             yield ProblemFault(what, (*keys, "delay"), "lower it, or lengthen the horizon")
+
+
+def samples(problem: Problem) -> Findings:
+    """Finds instants that are too far apart to see a load, which comes and goes between them."""
+    spans = {
+        "horizon": (problem.horizon_time, problem.horizon.samples),
+        "response": (problem.response_time, problem.response.samples),
+    }
+    for _, drive in _drives(problem):
+        frequency, width = (getattr(drive, name, None) for name in ("frequency", "width"))
+        if frequency is not None:
+            longest, named = 1.0 / (LEAST_SAMPLES * frequency), f"a period of {1 / frequency:g} s"
+        elif width is not None:
+            longest, named = width, f"a push that is {width:g} s wide"
+        else:
+            continue
+        for section, (time, count) in spans.items():
+            least = ceil((1.0 - _HAIR) * time / longest)
+            if count < least:
+                what = f"{count} samples in {time:g} s are too few to see {named}"
+                yield ProblemFault(what, (section, "samples"), f"give {least} or more")
+                break
 
 
 def reaction(problem: Problem) -> Findings:

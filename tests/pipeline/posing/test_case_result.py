@@ -26,8 +26,9 @@ def output_times(folder: Path, drive: str, end: float) -> Times:
     path = static.write(folder, static.HOLE, size=5)
     text = path.read_text()
     first, last = text.index("drive:"), text.index("constraints:")
-    horizon = f"horizon: {{ duration: {end} s, samples: 5 }}"
-    path.write_text(f"{text[:first]}{drive}\n{horizon}\n{text[last:]}")
+    horizon = f"horizon: {{ duration: {end} s, samples: 12 }}"
+    rest = text[last:].replace("samples: 9", "samples: 24")
+    path.write_text(f"{text[:first]}{drive}\n{horizon}\n{rest}")
     rows = f"0,0,0,0\n{end},1,0,0\n"
     (folder / "push.csv").write_text(f"time (s),ux (mm),uy (mm),theta (rad)\n{rows}")
     asked = load(path)

@@ -22,7 +22,8 @@ def written(folder: Path, drive: str, horizon: str = "duration: 1 s, steps: 4") 
     path = static.write(folder, static.HOLE, size=5)
     text = path.read_text()
     start, end = text.index("drive:"), text.index("constraints:")
-    path.write_text(f"{text[:start]}{drive}\nhorizon: {{ {horizon} }}\n{text[end:]}")
+    rest = text[end:].replace("samples: 9", "samples: 24")
+    path.write_text(f"{text[:start]}{drive}\nhorizon: {{ {horizon} }}\n{rest}")
     return path
 
 

@@ -70,6 +70,33 @@ def test_a_drive_comes_before_the_horizon_ends(refusal: Refusal) -> None:
     assert error.key == "presets.pulse.drive.delay"
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "preset", "what", "key", "remedy"),
+    [
+        (
+            "  periods: 2\n  samples: 200", "  periods: 10\n  samples: 11", None,
+            "11 samples in 5 s are too few to see a period of 0.5 s",
+            "horizon.samples", "give 60 or more",
+        ),
+        (
+            "  cycles: 4\n  samples: 401", "  cycles: 40\n  samples: 201", None,
+            "201 samples in 20 s are too few to see a period of 0.5 s",
+            "response.samples", "give 240 or more",
+        ),
+        (
+            "      duration: 400 ms", "      duration: 7 s", "pulse",
+            "200 samples in 7 s are too few to see a push that is 0.03 s wide",
+            "horizon.samples", "give 234 or more",
+        ),
+    ],
+)  # fmt: skip
+def test_samples_see_the_load(
+    refusal: Refusal, old: str, new: str, preset: str | None, what: str, key: str, remedy: str
+) -> None:
+    error = refusal(old, new, preset)
+    assert (error.what, error.key, error.remedy) == (what, key, remedy)
+
+
 @cases("problem", "text, what, line")
 def test_text_that_is_no_problem(tmp_path: Path, text: str, what: str, line: int | None) -> None:
     path = tmp_path / "problem.yaml"

@@ -20,8 +20,8 @@ def wave(tmp_path: Path) -> Path:
     for old, new in (
         ("kind: linear_ramp", "kind: ramp_harmonic\n  frequency: 20 Hz\n  rise_time: 50 ms"),
         ("  duration: 1 s\n", ""),
-        ("duration: 1 s, steps: 4", "periods: 2, samples: 8"),
-        ("samples: 9", "cycles: 2, samples: 9"),
+        ("duration: 1 s, steps: 4", "periods: 2, samples: 12"),
+        ("samples: 9", "cycles: 2, samples: 13"),
         ("supports:\n  - units: left\n", ""),
         (", geometric: { evaluations: 3 }", ""),
     ):
