@@ -69,7 +69,7 @@ class Horizon(Section):
     Attributes:
         periods: of the drive; or `duration`.
         duration: in time; or `periods`.
-        samples: instants spread over a motion in time, both ends included.
+        samples: instants spread over a motion in time, both ends included; six or more a period.
         steps: equal load steps of a static path, the unloaded start left out.
     """
 
@@ -126,7 +126,7 @@ class ResponseOptions(Section):
 
     Attributes:
         cycles: periods of the drive, in steady motion; a measured one is shown over the horizon.
-        samples: instants or load steps, both ends included.
+        samples: instants or load steps, both ends included; six or more a period.
     """
 
     cycles: Positive = 4.0

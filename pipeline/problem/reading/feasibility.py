@@ -60,7 +60,8 @@ def _contact_distance(problem: Problem) -> Findings:
     distance, gap = problem.contact.distance, problem.constraints.gap
     room = problem.lattice.ligament_length if gap is None else gap
     if distance is not None and distance > room:
-        what = f"units {room:g} mm apart at rest are within the contact distance, {distance:g} mm"
+        near = "ligaments hold units" if gap is None else "the constraint `gap` lets units be"
+        what = f"{near} {room:g} mm apart, within the contact distance, {distance:g} mm"
         yield ProblemFault(
             what, ("contact", "distance"), f"keep it to {room:g} mm, or leave it out"
         )

@@ -135,7 +135,8 @@ class Quads(Regular):
     """Squares of alternating bias on a square lattice, joined by ligaments at their corners.
 
     Attributes:
-        bias_angle: by which the squares are turned, left and right by turns.
+        bias_angle: by which the squares are turned: those of even i + j clockwise, the others
+            counter-clockwise.
     """
 
     corners: ClassVar[int] = 4
@@ -204,7 +205,8 @@ class Honeycomb(_WithNetwork, Regular):
     Rows are zigzags along x; the units of even i + j are joined to the row above.
 
     Attributes:
-        bias_angle: by which the triangles are turned, left and right by turns.
+        bias_angle: by which the triangles are turned: those of even i + j clockwise, the others
+            counter-clockwise.
     """
 
     corners: ClassVar[int] = 3

@@ -155,5 +155,7 @@ def _section(data: dict[str, Any], above: list[str], key: str) -> dict[str, Any]
         if not isinstance(section, dict | list):
             raise SettingError(f"{key}: {name!r} holds a value, and no keys")
     if isinstance(section, list):
-        raise SettingError(f"{key}: {above[-1]!r} holds a list; name an item by its number from 0")
+        sections = any(isinstance(item, dict) for item in section)
+        how = "name an item by its number from 0" if sections else "give all of its values at once"
+        raise SettingError(f"{key}: {above[-1]!r} holds a list; {how}")
     return section
