@@ -194,6 +194,8 @@ def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     whole = measures.overall(study.problem, values)
     of = {"key": measure.key, "what": measure.label, "unit": measure.unit}
     of_cases = measures.overall(study.problem, each)
+    several = each.sizes["case"] > 1
+    mean = ", of the weighted mean of the load cases" * several
     for name in ("altered", "cloaked"):
         told = {"where": where, "formula": measure.formula}
         yield from _each(study, "{key}", whole, [name], **of, **told)
@@ -205,9 +207,13 @@ def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     if path.static:
         gains = (1.0 - cloaked / altered).isel(time=slice(altered.sizes["time"] // 2, None))
         least = float(gains.min())
-        yield _told("{key}_reduction_least", least, key=measure.key, what=measure.label)
+        told = {"key": measure.key, "what": measure.label}
+        yield _told("{key}_reduction_least", least, mean=mean, **told)
+    # a mean over load cases would hide the case with the largest
+    most = float(each.sel(structure="cloaked").max())
     note = "the largest on the whole path" if path.static else "the largest at any time"
-    yield _told("{key}_cloaked_most", float(cloaked.max()), note=note, **of)
+    note += " of any load case" * several
+    yield _told("{key}_cloaked_most", most, note=note, **of)
 
 
 def _each_load(

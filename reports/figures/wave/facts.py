@@ -54,11 +54,15 @@ def drive_facts(study: StudyResults) -> Iterator[Fact]:
 def error_facts(study: StudyResults) -> Iterator[Fact]:
     """Yields relative error over the whole history, and the largest mimicking error."""
     error = over_cases(study.problem, relative_error(study.problem, study.response))
-    most = over_cases(study.problem, measures.measure_of(study.problem).of(study.response))
+    most = measures.measure_of(study.problem).of(study.response)
+    several = most.sizes["case"] > 1
+    mean = "; weighted mean of the load cases" * several
+    any_case = "; the largest of any load case" * several
     for name in ("altered", "cloaked"):
         of = {"name": name, "shown": display_name(study.problem, name).lower()}
-        yield _told("error_{name}", float(error.sel(structure=name)), **of)
-        yield _told("peak_{name}", float(most.sel(structure=name).max()), **of)
+        yield _told("error_{name}", float(error.sel(structure=name)), mean=mean, **of)
+        peak = float(most.sel(structure=name).max())
+        yield _told("peak_{name}", peak, any_case=any_case, **of)
     gain = 1.0 - float(error.sel(structure="cloaked")) / float(error.sel(structure="altered"))
     yield _told("error_reduction", gain)
 

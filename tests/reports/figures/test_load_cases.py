@@ -70,6 +70,15 @@ def test_each_load_case_has_rows_snapshots_and_a_curve(two: StudyResults) -> Non
     assert "shear 90°" in found["rotation_altered_case1"].label
     assert found["rotation_altered"].note.endswith("; weighted mean of the load cases")
     assert found["rotation_altered_case1"].note == "one load case"
+    once_most, most = (
+        float(measures.rotation(two.response).sel(structure="cloaked")[case].max())
+        for case in (0, 1)
+    )
+    assert most == pytest.approx(3 * once_most)
+    assert found["rotation_cloaked_most"].value == pytest.approx(most)  # not of the mean
+    assert found["rotation_cloaked_most"].note == "the largest on the whole path of any load case"
+    assert found["rotation_reduction_least"].note.endswith("weighted mean of the load cases")
+    assert found["rotation_reduction_least"].unit == "%"
     several = [*facts.reaction_facts(two, path), *facts.contraction_facts(two, path)]
     told = [fact.note for fact in several if "_case" not in fact.key]
     assert told

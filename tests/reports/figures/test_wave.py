@@ -1,5 +1,8 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import xarray as xr
 
 from pipeline import problem
 from pipeline.posing import law_comparison
@@ -10,11 +13,12 @@ from reports.figures.wave import contacts, edge_contacts, facts
 from reports.figures.wave.monitored_places import places, relative_error
 from reports.study import StudyResults, deformed, from_dataset
 
+PROBLEM = ROOT / "experiments/fig7/problem.yaml"
 CUTOFF = np.deg2rad(-10.0)
 
 
 def test_a_mimicked_wave_has_its_own_report(shield: StudyResults, smile: StudyResults) -> None:
-    wave = problem.load(ROOT / "experiments/fig7/problem.yaml")
+    wave = problem.load(PROBLEM)
     assert kinds.kind_of(wave).facts is facts.wave_facts
     assert kinds.kind_of(shield.problem).facts is not facts.wave_facts
     assert kinds.kind_of(smile.problem).facts is not facts.wave_facts
@@ -93,3 +97,31 @@ def test_relative_error_by_hand(smile: StudyResults) -> None:
     falling["displacement"] = turned
     at_end = measures.size_of_intact(smile.response, scale, static=True)
     np.testing.assert_allclose(measures.size_of_intact(falling, scale, static=False), at_end)
+
+
+def in_two_cases(study: StudyResults) -> StudyResults:
+    """The study whose structures miss the intact one three times as far in a second load case."""
+    directions = (*study.problem.drive.directions, 0.0)  # type: ignore[union-attr]
+    drive = study.problem.drive.model_copy(update={"directions": directions, "weights": None})
+    second = study.response.assign_coords(direction=("case", [0.0]))
+    intact = second["displacement"].sel(structure="intact", drop=True)
+    farther = intact + 3.0 * (second["displacement"] - intact)
+    second = second.assign(displacement=farther.transpose(*second["displacement"].dims))
+    both = xr.concat([study.response, second], "case", data_vars="minimal", coords="minimal")
+    response = both.assign_attrs(study.response.attrs)
+    posed = study.problem.model_copy(update={"drive": drive})
+    return replace(study, problem=posed, datasets={**study.datasets, "response": response})
+
+
+def test_the_largest_error_is_that_of_any_load_case(smile: StudyResults) -> None:
+    """Where a mean over the cases would be two thirds of it."""
+    one = {fact.key: fact for fact in facts.error_facts(smile)}
+    two = {fact.key: fact for fact in facts.error_facts(in_two_cases(smile))}
+    for name in ("altered", "cloaked"):
+        assert two[f"peak_{name}"].value == pytest.approx(3 * one[f"peak_{name}"].value)
+        assert two[f"error_{name}"].value == pytest.approx(2 * one[f"error_{name}"].value)
+        assert (
+            two[f"peak_{name}"].note == f"{one[f'peak_{name}'].note}; the largest of any load case"
+        )
+        mean = f"{one[f'error_{name}'].note}; weighted mean of the load cases"
+        assert two[f"error_{name}"].note == mean
