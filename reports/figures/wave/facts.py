@@ -127,8 +127,14 @@ def step_facts(verification: xr.Dataset | None) -> Iterator[Fact]:
                 "check_{key}_{structure}",
                 float(part["loss"]),
                 error=float(part["error"]),
-                step=worded(1e6 * float(part["time_step"]), "µs", 4),
+                steps=_steps(float(part["time_step"])),
                 overlaps=overlapping(int(part["overlaps"])),
                 off=off,
                 **of,
             )
+
+
+def _steps(length: float) -> str:
+    """Tells in words how long steps are, s; NaN of steps that are not equally long."""
+    graded = "steps graded in time"
+    return graded if np.isnan(length) else f"steps of {worded(1e6 * length, 'µs', 4)}"

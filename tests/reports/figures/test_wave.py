@@ -125,3 +125,17 @@ def test_the_largest_error_is_that_of_any_load_case(smile: StudyResults) -> None
         )
         mean = f"{one[f'error_{name}'].note}; weighted mean of the load cases"
         assert two[f"error_{name}"].note == mean
+
+
+@pytest.mark.parametrize(
+    ("length", "told"), [(2e-5, "steps of 20 µs"), (np.nan, "steps graded in time")]
+)
+def test_graded_steps_are_told_in_words(length: float, told: str) -> None:
+    one = {"loss": 0.1, "error": 0.2, "departure": 0.0, "time_step": length, "overlaps": 0}
+    numbers = {name: (("check", "structure"), [[value] * 2]) for name, value in one.items()}
+    made = xr.Dataset(
+        numbers | {"status": ("check", ["ok"])},
+        {"check": ["as run"], "structure": ["altered", "cloaked"]},
+    )
+    found = list(facts.step_facts(made))
+    assert {fact.note for fact in found} == {f"relative error 0.2; {told}; none overlap"}
