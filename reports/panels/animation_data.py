@@ -45,6 +45,8 @@ MOST_STEPS = 200
 LARGEST_MOTION = 3_000_000
 """Bytes that the quantised motion of all structures and cases may take before base64."""
 
+ROUNDING = 1e-9
+"""Below which a displacement or a rotation is rounding; as a share, one beside another."""
 NO_DATA = -32768
 LARGEST_LEVEL = 32767
 
@@ -153,8 +155,11 @@ def payload(reel: Animation) -> dict[str, Any]:
 
 
 def round_up(value: float) -> float:
-    """Returns the next value of one significant digit, or two where the first is 1."""
-    if value <= 0:
+    """Returns the next value of one significant digit, or two where the first is 1.
+
+    It is 1 where the value is none but rounding, which colours should not magnify.
+    """
+    if value < ROUNDING:
         return 1.0
     step = 10.0 ** np.floor(np.log10(value))
     step = step / 10.0 if value / step < 2.0 else step

@@ -7,7 +7,13 @@ import xarray as xr
 
 from reports.base import style
 from reports.panels import measured_overlay
-from reports.panels.animation_data import AnimationAxis, AnimationClip, ColourField, round_up
+from reports.panels.animation_data import (
+    ROUNDING,
+    AnimationAxis,
+    AnimationClip,
+    ColourField,
+    round_up,
+)
 from reports.study import StudyResults, from_dataset
 from sim.core import Floats
 
@@ -66,5 +72,9 @@ def turn_field(motion: Floats) -> ColourField:
 def signed_field(key: Literal["ux", "uy", "theta"], motion: Floats) -> ColourField:
     """Returns the colours of one displacement or of the rotation for motions (..., 3)."""
     column, label, unit, factor = _SIGNED[key]
-    most = round_up(factor * float(np.nanmax(np.abs(motion[..., column]))))
+    largest = float(np.nanmax(np.abs(motion[..., column])))
+    shift = float(np.nanmax(np.abs(motion[..., :2])))
+    if key != "theta" and largest < ROUNDING * shift:
+        largest = shift  # across this way nothing moves
+    most = round_up(factor * largest)
     return ColourField(key, label, unit, factor, "signed", (-most, most))

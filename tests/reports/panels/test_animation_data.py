@@ -76,6 +76,21 @@ def test_lost_units_are_marked_as_such() -> None:
     ).all()
 
 
+def test_colours_do_not_magnify_rounding() -> None:
+    motion = np.zeros((1, 3, 4, 3))
+    motion[..., 0] = 2.5
+    motion[..., 1] = 1e-14
+    assert panels.signed_field("ux", motion).limits == (-3.0, 3.0)
+    assert panels.signed_field("uy", motion).limits == (-3.0, 3.0)  # beside the motion along x
+    motion[..., 1] = 1e-4
+    assert panels.signed_field("uy", motion).limits == pytest.approx((-1e-4, 1e-4))
+    motion[...] = 1e-16
+    assert panels.signed_field("uy", motion).limits == (-1.0, 1.0)
+    assert panels.signed_field("theta", motion).limits == (-1.0, 1.0)
+    assert panels.turn_field(motion).limits == (0.0, 1.0)
+    assert panels.size_field(motion, 15.0).limits == (0.0, 1.0)
+
+
 def test_a_static_study_needs_no_time_and_no_motion_is_exact() -> None:
     data = static(np.zeros((1, 3, 4, 3)))
     assert data["motion"][0][0]["step"] == [0.0, 0.0, 0.0]
