@@ -27,6 +27,8 @@ it."""
 ORDER = ("intact", "altered", "cloaked")
 _ALONG = np.cos(np.pi / 4)
 """Of a drive: nearer to the line than to its normal it strains along it, else it shears."""
+_NEGLIGIBLE = 1e-4
+"""Share of the largest load below which a label calls a load zero."""
 SECOND = "Cloaked, no overlap"
 """Label of the design for contact on distance."""
 
@@ -67,10 +69,13 @@ class Abscissa:
 
     def at(self, sample: int) -> str:
         """Returns the value at a sample in words, with the paper's label of it."""
-        words = f"{self.values[sample]:.3g} {self.unit}".replace(" °", "°")
+        value = self.values[sample]
+        if self.static and abs(value) < _NEGLIGIBLE * float(np.abs(self.values).max()):
+            value = 0.0  # a smooth ramp does not begin at nought
+        words = f"{value:.3g} {self.unit}".replace(" °", "°")
         if self.strain is None:
             return words
-        share = 100.0 * self.strain * self.values[sample] / self.values[-1]
+        share = 100.0 * self.strain * value / self.values[-1]
         return f"{words} ({share:.2g} %)"
 
 

@@ -17,6 +17,7 @@ from pipeline.problem.sections import (
     Quads,
     RampHarmonicDrive,
     Region,
+    TanhRampDrive,
     resolve_centre,
     single_drives,
 )
@@ -101,7 +102,10 @@ def scene_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
         yield _load_fact(path)
         if path.displaces:
             yield from strain_facts(problem, path)
-        yield _told("load_steps", problem.horizon.steps or problem.horizon.samples)
+        loads = problem.horizon.steps or problem.horizon.samples
+        smooth = any(isinstance(drive, TanhRampDrive) for drive in single_drives(problem.drive))
+        time = " in time, not in displacement" * smooth
+        yield _told("load_steps", loads, time=time)
     else:
         if isinstance(problem.drive, HarmonicDrive | RampHarmonicDrive):
             yield _told("amplitude", problem.drive.amplitude, name="Amplitude A", unit="mm")

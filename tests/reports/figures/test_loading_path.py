@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from pipeline.posing import law_comparison
 from pipeline.problem import Output
-from pipeline.problem.sections import Method, Methods, Paper
+from pipeline.problem.sections import Method, Methods, Paper, TanhRampDrive
 from reports.facts import checks, fact_records, loss_formula
 from reports.facts.copies import in_words, spreads
 from reports.figures import kinds
@@ -159,6 +159,32 @@ def test_the_axis_is_the_displacement_of_the_driven_units(shield: StudyResults) 
     assert [way.at(k) for k in way.shown] == [
         "0 mm (0 %)", "5.62 mm (3.8 %)", "11.2 mm (7.5 %)", "15 mm (10 %)",
     ]  # fmt: skip
+
+
+def test_a_smooth_ramp_begins_at_zero_and_its_loads_are_not_equally_spaced(
+    shield: StudyResults,
+) -> None:
+    amplitude = 15.0
+    ramp = 0.5 * amplitude * (1.0 + np.tanh(np.linspace(-6.0, 6.0, 9)))
+    strained = abscissa.abscissa_of(shield.problem, shield.response)
+    path = dataclasses.replace(strained, values=ramp)
+    assert ramp[0] > 0.0
+    assert path.at(0) == "0 mm (0 %)"
+    assert path.at(-1) == "15 mm (10 %)"
+    assert path.at(1) == "0.00185 mm (0.0012 %)"
+    wave = dataclasses.replace(path, static=False, strain=None, unit="s")
+    assert wave.at(0) == "9.22e-05 s"
+    drive = TanhRampDrive.model_construct(
+        kind="tanh_ramp", units="right", amplitude=amplitude, directions=(np.pi,), duration=1.0
+    )
+    smooth = shield.problem.model_copy(update={"drive": drive})
+    asked = dataclasses.replace(shield, problem=smooth)
+    for study, note in (
+        (shield, "equally spaced"),
+        (asked, "equally spaced in time, not in displacement"),
+    ):
+        found = {fact.key: fact.note for fact in path_facts.scene_facts(study, path)}
+        assert found["load_steps"] == note
 
 
 def test_contacts_are_those_at_the_end_of_the_path(smile: StudyResults) -> None:
