@@ -4,6 +4,7 @@ from . import figure as figure
 from . import measures as measures
 from .abscissa import Abscissa as Abscissa
 from .abscissa import abscissa_of as abscissa_of
+from .abscissa import load_names as load_names
 from .abscissa import structures as structures
 from .contact_comparison import overlapping as overlapping
 from .curves import measure_panel as measure_panel

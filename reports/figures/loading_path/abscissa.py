@@ -104,11 +104,12 @@ def abscissa_of(problem: Problem, response: xr.Dataset) -> Abscissa:
 
 
 def load_names(problem: Problem, response: xr.Dataset | xr.DataArray) -> tuple[str, ...]:
-    """Names the load cases by their angles; those of a slow load at a side by their kind."""
+    """Names the load cases by their angles; those of a slow load at a side by their kind too."""
     angles = response["direction"].values.astype(float)
-    if not problem.static or np.isnan(angles).any():
+    if np.isnan(angles).any():
         return tuple(f"load {number + 1}" for number in range(len(angles)))
-    names = [f"{load_kind(problem, angle)} {angle % 360.0:g}°" for angle in angles]
+    kinds = (load_kind(problem, angle) if problem.static else "along" for angle in angles)
+    names = [f"{kind} {angle % 360.0:g}°" for kind, angle in zip(kinds, angles, strict=True)]
     if len(set(names)) == len(names):
         return tuple(names)
     # of several drives the first one may be the same in all cases

@@ -152,10 +152,17 @@ def test_curves_of_many_cases_stay_on_their_panel(two: StudyResults) -> None:
     assert low <= 0.0 < most < high
 
 
-def test_equal_loads_are_numbered_and_a_clockwise_turn_ascends(two: StudyResults) -> None:
+def test_equal_loads_are_numbered_and_a_clockwise_turn_ascends(
+    two: StudyResults, study: StudyResults
+) -> None:
     alike = two.response.assign_coords(direction=("case", [180.0, 180.0]))
     names = abscissa.load_names(two.problem, alike)
     assert names == ("load 1, compression 180°", "load 2, compression 180°")
+    shaken = two.problem.model_copy(update={"drive": study.problem.drive})
+    assert abscissa.load_names(shaken, two.response) == ("along 180°", "along 90°")
+    assert abscissa.load_names(shaken, alike)[1] == "load 2, along 180°"
+    unknown = two.response.assign_coords(direction=("case", [np.nan, np.nan]))
+    assert abscissa.load_names(shaken, unknown) == ("load 1", "load 2")
     turn = RotationDrive.model_validate(
         {"kind": "rotation", "units": "right", "amplitude": -0.2}, context=SIM_UNITS
     )

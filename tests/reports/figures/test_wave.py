@@ -7,11 +7,13 @@ import xarray as xr
 from pipeline import problem
 from pipeline.posing import law_comparison
 from pipeline.runtime import ROOT
+from reports.base import style
 from reports.figures import kinds
 from reports.figures.loading_path import measures
-from reports.figures.wave import contacts, edge_contacts, facts
+from reports.figures.wave import contacts, edge_contacts, facts, figure
 from reports.figures.wave.monitored_places import places, relative_error
 from reports.study import StudyResults, deformed, from_dataset
+from tests.reports import figure_assertions
 
 PROBLEM = ROOT / "experiments/fig7/problem.yaml"
 CUTOFF = np.deg2rad(-10.0)
@@ -99,24 +101,25 @@ def test_relative_error_by_hand(smile: StudyResults) -> None:
     np.testing.assert_allclose(measures.size_of_intact(falling, scale, static=False), at_end)
 
 
-def in_two_cases(study: StudyResults) -> StudyResults:
-    """The study whose structures miss the intact one three times as far in a second load case."""
-    directions = (*study.problem.drive.directions, 0.0)  # type: ignore[union-attr]
-    drive = study.problem.drive.model_copy(update={"directions": directions, "weights": None})
-    second = study.response.assign_coords(direction=("case", [0.0]))
+def in_cases(study: StudyResults, degrees: list[float]) -> StudyResults:
+    """The study whose structures miss the intact one three times as far in all cases but one."""
+    ways = tuple(np.radians([*study.response["direction"].values, *degrees]))
+    drive = study.problem.drive.model_copy(update={"directions": ways, "weights": None})
+    second = study.response
     intact = second["displacement"].sel(structure="intact", drop=True)
     farther = intact + 3.0 * (second["displacement"] - intact)
     second = second.assign(displacement=farther.transpose(*second["displacement"].dims))
-    both = xr.concat([study.response, second], "case", data_vars="minimal", coords="minimal")
-    response = both.assign_attrs(study.response.attrs)
+    others = (second.assign_coords(direction=("case", [degree])) for degree in degrees)
+    made = xr.concat([study.response, *others], "case", data_vars="minimal", coords="minimal")
+    response = made.assign_attrs(study.response.attrs)
     posed = study.problem.model_copy(update={"drive": drive})
-    return replace(study, problem=posed, datasets={**study.datasets, "response": response})
+    return replace(study, problem=posed, datasets={"design": study.design, "response": response})
 
 
 def test_the_largest_error_is_that_of_any_load_case(smile: StudyResults) -> None:
     """Where a mean over the cases would be two thirds of it."""
     one = {fact.key: fact for fact in facts.error_facts(smile)}
-    two = {fact.key: fact for fact in facts.error_facts(in_two_cases(smile))}
+    two = {fact.key: fact for fact in facts.error_facts(in_cases(smile, [0.0]))}
     for name in ("altered", "cloaked"):
         assert two[f"peak_{name}"].value == pytest.approx(3 * one[f"peak_{name}"].value)
         assert two[f"error_{name}"].value == pytest.approx(2 * one[f"error_{name}"].value)
@@ -139,3 +142,20 @@ def test_graded_steps_are_told_in_words(length: float, told: str) -> None:
     )
     found = list(facts.step_facts(made))
     assert {fact.note for fact in found} == {f"relative error 0.2; {told}; none overlap"}
+
+
+@pytest.mark.parametrize("degrees", [[90.0], [90.0, 0.0, 270.0], [180.0, 180.0]])
+def test_a_legend_of_several_loads_covers_no_curve(
+    smile: StudyResults, degrees: list[float]
+) -> None:
+    """It stands between the title and the curves, on the page; of alike loads it is longest."""
+    with style.styled():
+        made = figure_assertions.drawn(figure.wave_figure(in_cases(smile, degrees)).draw())
+    axes = next(axes for axes in made.axes if axes.get_ylabel() == "$u_y$ (mm)" and axes.lines)
+    legend = axes.get_legend()
+    assert legend is not None
+    box = legend.get_window_extent()
+    assert axes.get_window_extent().y1 <= box.y0
+    assert made.bbox.x0 <= box.x0 < box.x1 <= made.bbox.x1
+    titles = [text for text in made.texts if text.get_text().startswith("Vertical displacement")]
+    assert box.y1 <= titles[0].get_window_extent().y0
