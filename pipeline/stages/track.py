@@ -53,6 +53,7 @@ from pipeline.tracking.output import (
     assemble_track,
     dic_points,
     driven_units,
+    track_table_path,
     write_track_table,
 )
 from pipeline.tracking.reference_frame import RecordingSetup, proposal
@@ -91,7 +92,7 @@ def _points(path: Path, args: argparse.Namespace) -> None:
     source = _design(asked.design, path, args.design)
     design = as_built(datasets.read(source, "design"), asked.structure)
     held = path.parent / asked.points
-    table = sidecar_path(args.out, path, held, suffix=".csv")
+    table = track_table_path(args.out, path, held)
     with found_in(path):
         seen = dic_points.read_points(held, asked)
         made = dic_points.track(design, seen, asked.subset)
@@ -234,7 +235,8 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     if asked.load_cell is not None:
         held = parents["load_cell"] = path.parent / asked.load_cell.file
         log = _logged(asked, asked.load_cell, held, video)
-    table = sidecar_path(args.out, path, *parents.values(), suffix=".csv")
+    out, partial = args.out, args.out.with_name(f"{args.out.stem}_partial.nc")
+    table, other = (track_table_path(each, path, *parents.values()) for each in (out, partial))
     track = followed(asked, design, video, path)
     force = None
     if log is not None and asked.load_cell is not None:
@@ -245,10 +247,8 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     made = assemble_track(design, track, force)
     synthetic = asked.synthetic or rendered(video)
     origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=synthetic)
-    out = args.out
     if track.ended is not None:  # a build deletes what a rule that failed was to make
-        out = args.out.with_name(f"{args.out.stem}_partial.nc")
-        table = out.with_suffix(".csv")
+        out, table = partial, other
     datasets.write(made, out, "track", origin)
     write_track_table(made.assign_attrs(origin), table)
     if track.ended is not None:

@@ -7,4 +7,5 @@ from .track_dataset import drive_displacement as drive_displacement
 from .track_dataset import driven_units as driven_units
 from .track_dataset import grip_displacement as grip_displacement
 from .track_dataset import label_track as label_track
+from .track_dataset import track_table_path as track_table_path
 from .track_dataset import write_track_table as write_track_table

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.datasets.tables import TABLES
-from pipeline.runtime import write_atomically
+from pipeline.runtime import UserError, refusal, sidecar_path, write_atomically
 from pipeline.tracking.motion import Track
 from sim.core import Floats, Ints, Mask, Reals
 
 _MOTION = ("time", "unit", "dof")
 _NUMBERS = ("ux_mm", "uy_mm", "theta_rad", "sigma_ux_mm", "sigma_uy_mm", "sigma_theta_rad")
 _LOADS = ("load_N", "drive_x_mm", "drive_y_mm")
+_HEADING = ",".join(["time_s", "unit", "i", "j", *_NUMBERS, *_LOADS, "quality"])
 
 
 def assemble_track(design: xr.Dataset, track: Track, force: Floats | None = None) -> xr.Dataset:
@@ -140,6 +141,31 @@ def absent_flag() -> int:
     return TABLES["track"]["quality"].flags["absent"]
 
 
+def track_table_path(out: Path, *sources: Path) -> Path:
+    """Names the table beside a track, which replaces no file but such a table.
+
+    Raises:
+        UserError: there is another one of that name, such as a log of forces.
+    """
+    path = sidecar_path(out, *sources, suffix=".csv")
+    if path.exists() and not _is_track_table(path):
+        what = "this file would be written over, and is no table of tracks"
+        remedy = f"give the track another name or folder; {path.name} is put beside it"
+        raise UserError(what, file=path, key="--out", value=str(out), remedy=remedy)
+    return path
+
+
+def _is_track_table(path: Path) -> bool:
+    """Tells a table of tracks by its heading, which a note of a rendered video may precede."""
+    try:
+        with path.open("rb") as file:
+            first = [file.readline(len(_HEADING) + 2) for _ in range(2)]
+    except OSError as error:
+        raise refusal(path, error) from error
+    note, heading = (line.decode("utf-8", "replace").rstrip() for line in first)
+    return note == _HEADING or (note.startswith("# ") and heading == _HEADING)
+
+
 def write_track_table(track: xr.Dataset, path: Path) -> None:
     """Writes one line a frame and unit, absent units left out; empty where there is no value.
 
@@ -159,7 +185,7 @@ def write_track_table(track: xr.Dataset, path: Path) -> None:
     with write_atomically(path) as aside, aside.open("w", encoding="utf-8", newline="\n") as file:
         if track.attrs["synthetic"] == "yes":
             file.write(f"# {SYNTHETIC_LABEL}: of a rendered video\n")
-        file.write(",".join(["time_s", "unit", "i", "j", *_NUMBERS, *_LOADS, "quality"]) + "\n")
+        file.write(_HEADING + "\n")
         for frame, time in enumerate(track["time"].values):
             load = _cells(loads[frame])
             numbers = np.concatenate([pose[frame], sigma[frame]], axis=-1)

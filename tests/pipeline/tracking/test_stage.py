@@ -202,6 +202,19 @@ def test_the_track_of_a_video_that_breaks_off_is_kept(tmp_path: Path, failing: F
     assert not list(tmp_path.glob("track.*"))
 
 
+@pytest.mark.parametrize("name", ["track.csv", "track_partial.csv"])
+def test_a_log_beside_the_track_is_refused_before_the_tracking(
+    recording: Path, failing: Failing, name: str
+) -> None:
+    log = recording.with_name(name)
+    log.write_text("time,force\n0,0\n", encoding="utf-8")
+    words = refused(recording, failing)
+    assert f"file:   {log}" in words
+    assert "units;" not in words
+    assert log.read_text(encoding="utf-8") == "time,force\n0,0\n"
+    assert not recording.with_name("track.nc").exists()
+
+
 @cases("tracking", "changes, key, what")
 def test_a_grid_without_sense_is_refused(
     changes: dict[str, object], key: str, what: str, tmp_path: Path, failing: Failing

@@ -1,8 +1,12 @@
+from pathlib import Path
+
 import numpy as np
+import pytest
 import xarray as xr
 
 from pipeline.datasets.tables import TABLES
-from pipeline.tracking.output import drive_displacement
+from pipeline.tracking.output import drive_displacement, track_table_path, write_track_table
+from tests.tables import refused
 
 
 def test_a_lost_driven_unit_does_not_move_the_drive() -> None:
@@ -28,3 +32,24 @@ def test_a_lost_driven_unit_does_not_move_the_drive() -> None:
     assert np.isfinite(drive_displacement(motion, design)).all()
     motion[7] = np.nan
     assert np.isnan(drive_displacement(motion, design)[7]).all()
+
+
+@pytest.mark.parametrize("synthetic", ["yes", "no"])
+def test_a_table_replaces_none_but_its_own_kind(tmp_path: Path, synthetic: str) -> None:
+    """A log of forces may lie where the table of a track would."""
+    out, table = tmp_path / "run.nc", tmp_path / "run.csv"
+    assert track_table_path(out) == table
+    for kept in ("time,force\n0,1\n", "# kN\ntime_s,unit\n", "", "Zeit;Kraft \xb0\n" * 99):
+        table.write_text(kept, encoding="latin-1")
+        with refused("would be written over", "--out", file=table, remedy="run.csv is put beside"):
+            track_table_path(out)
+    blank = xr.Dataset(
+        {name: ("unit", np.zeros(0, int)) for name in ("unit", "i", "j")}
+        | {name: (("time", "unit"), np.zeros((0, 0))) for name in ("quality", "displacement")}
+        | {"sigma": (("time", "unit"), np.zeros((0, 0))), "time": ("time", np.zeros(0))}
+        | {"load_force": ("time", np.zeros(0))}
+        | {"drive_displacement": (("time", "xy"), np.zeros((0, 2)))},
+        attrs={"synthetic": synthetic},
+    )
+    write_track_table(blank, table)
+    assert track_table_path(out) == table
