@@ -5,6 +5,7 @@ from .frame import BrokenOffError as BrokenOffError
 from .frame import Frame as Frame
 from .frame import UntimedError as UntimedError
 from .frame_times import has_uneven_intervals as has_uneven_intervals
+from .frame_times import within_interval as within_interval
 from .picture import read_picture as read_picture
 from .picture import read_pictures as read_pictures
 from .picture_folder import pictures as pictures

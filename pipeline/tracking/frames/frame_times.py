@@ -1,12 +1,14 @@
 """Tells times of frames, and how many of them a file promises."""
 
 import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import av
 import numpy as np
 
-from pipeline.tracking.frames.frame import untimed
+from pipeline.runtime import UserError
+from pipeline.tracking.frames.frame import Frame, untimed
 from sim.core import Floats
 
 _ROUNDED = 0.5
@@ -17,6 +19,8 @@ BARE = {"h264", "hevc", "m4v", "mjpeg"}
 
 _BEGINNING = 8
 """Frames whose stamps show whether they are too coarse for the rate."""
+_SOME, _SLACK = 32, 1.05
+"""Frames at most that tell the interval; part of it by which rounded numbers may be longer."""
 _ALL = 0.95
 """A video with less of the frames than this that its file promises breaks off."""
 
@@ -25,6 +29,35 @@ def has_uneven_intervals(time: Floats) -> bool:
     """Tells intervals of frames (frames,) s that differ by more than stamps are rounded."""
     interval = np.diff(time)
     return bool(len(interval) and np.ptp(interval) > _ROUNDED * np.median(interval))
+
+
+def within_interval(frames: Iterator[Frame], lasting: Mapping[str, float]) -> Iterator[Frame]:
+    """Yields the frames; refuses keys whose time, s, is longer than from a frame to the next.
+
+    Raises:
+        UserError: after some frames, as soon as they tell.
+    """
+    times: list[float] = []
+    for frame in frames:
+        if len(times) < _SOME:
+            times.append(frame.time)
+            if len(times) == _SOME:
+                _check_lasting(times, lasting)
+        yield frame
+    if 1 < len(times) < _SOME:
+        _check_lasting(times, lasting)
+
+
+def _check_lasting(times: list[float], lasting: Mapping[str, float]) -> None:
+    interval = float(np.median(np.diff(times)))
+    if interval <= 0.0:  # times that do not tell are warned of elsewhere
+        return
+    for key, lasts in lasting.items():
+        if lasts > _SLACK * interval:
+            what = "longer than the interval between frames"
+            remedy = f"give at most {1000 * interval:.3g} ms, the frames' interval; or correct"
+            remedy = f"{remedy} frame_rate, in slow motion how many were taken in a second"
+            raise UserError(what, key=key, value=f"{1000 * lasts:.6g} ms", remedy=remedy)
 
 
 class FrameClock:

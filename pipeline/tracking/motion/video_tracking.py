@@ -18,7 +18,7 @@ from pipeline.tracking.detect import (
     orientation_text,
 )
 from pipeline.tracking.fit import ExposureBlur, PoseFitter, SideWalls, learn_templates
-from pipeline.tracking.frames import BrokenOffError, Frame
+from pipeline.tracking.frames import BrokenOffError, Frame, within_interval
 from pipeline.tracking.geometry import SpecimenOutlines, arm_swing, lens_variance
 from pipeline.tracking.motion import uncertainty
 from pipeline.tracking.motion.camera_motion import camera_variance, remove_camera_motion, row_times
@@ -94,9 +94,11 @@ def track_video(
         setup: what is known of it.
 
     Raises:
-        UserError: no frames, or the specimen is not in the first one.
+        UserError: no frames, the specimen is not in the first one, its motion is known in none, or
+            the exposure or the readout is longer than from a frame to the next.
     """
-    shown = average_at_rest(frames)
+    lasting = {"exposure": setup.exposure or 0.0, "readout": abs(setup.readout)}
+    shown = average_at_rest(within_interval(frames, lasting))
     if not shown.averaged:
         raise UserError("the video has no frame in this window", key="window", remedy="widen it")
     ways = recognise(shown.image, specimen, px_per_mm, setup)
@@ -124,17 +126,7 @@ def track_video(
         late = row_times(motion, specimen, calibration, setup)
         bend = exposure**2 / 24 * shares[..., _OF_DOF]
         motion, sigmas, missed = at_frame_times(motion, sigmas, time, late, bend, near, rest)
-        off = np.sqrt(missed[..., :2].max(axis=-1)) / calibration.pixel
-        usual = np.median(off, axis=1, keepdims=True)  # one unit alone has met with noise
-        unsure = (off > _UNSURE) & (usual > _UNSURE / 5)
-        if unsure.any():
-            motion[unsure], qualities[unsure] = np.nan, POOR_FIT
-            LOG.warning(
-                "%.2g %% of the poses are lost, as more moves from frame to frame than"
-                " tells where units were when other rows were read: film at a higher rate, or rest"
-                " in the first frame",
-                100 * unsure.mean(),
-            )
+        _lose_unsure(motion, missed, qualities, calibration.pixel)
     _count_from_rest(motion, rest, np.nan_to_num(places.offset).astype(np.float32))
     _add_variances(missed, motion, places, specimen, calibration)
     remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
@@ -153,6 +145,28 @@ def track_video(
     motion[vague], sigma[vague], qualities[vague] = np.nan, np.nan, POOR_FIT
     start = float(times[0])
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended, rest)
+
+
+def _lose_unsure(motion: Reals, missed: Reals, qualities: NDArray[np.int8], pixel: float) -> None:
+    """Marks, in place, poses (frames, units) as lost that are not known at their frames' times.
+
+    Raises:
+        UserError: that are all.
+    """
+    off = np.sqrt(missed[..., :2].max(axis=-1)) / pixel
+    usual = np.median(off, axis=1, keepdims=True)  # one unit alone has met with noise
+    unsure = (off > _UNSURE) & (usual > _UNSURE / 5)
+    motion[unsure], qualities[unsure] = np.nan, POOR_FIT
+    if not np.isfinite(motion).any():
+        what, remedy = "no unit has a pose in any frame", "correct exposure and readout"
+        raise UserError(what, remedy=f"{remedy}, film at a higher rate, or rest in the first frame")
+    if unsure.any():
+        LOG.warning(
+            "%.2g %% of the poses are lost, as more moves from frame to frame than"
+            " tells where units were when other rows were read: film at a higher rate, or rest"
+            " in the first frame",
+            100 * unsure.mean(),
+        )
 
 
 def _add_variances(

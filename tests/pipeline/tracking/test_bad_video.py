@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 
 import cv2
@@ -19,9 +20,10 @@ from pipeline.tracking.frames import (
     import_video,
     read_frames,
     read_pictures,
+    within_interval,
 )
 from pipeline.tracking.geometry import outlines_of_design
-from pipeline.tracking.motion import Track, track_video
+from pipeline.tracking.motion import Track, track_video, video_tracking
 from pipeline.tracking.motion.unit_looks import GLARE, HIDDEN, OUT_OF_FRAME
 from pipeline.tracking.reference_frame import RecordingSetup
 from tests.pipeline.tracking.conftest import CLIPS
@@ -45,6 +47,40 @@ def timed(images: list[np.ndarray]) -> Iterator[Frame]:
 
 def followed(shown: Iterator[Frame]) -> Track:
     return track_video(shown, SPECIMEN, SCALE)
+
+
+@pytest.mark.parametrize(
+    ("key", "setup"),
+    [("exposure", RecordingSetup(exposure=0.05)), ("readout", RecordingSetup(readout=-0.05))],
+)
+def test_what_lasts_longer_than_an_interval_is_refused(
+    clip: list[np.ndarray], key: str, setup: RecordingSetup
+) -> None:
+    """By the frames' times, as the recording's rate has them; one a little longer is rounded."""
+    with refused("longer than the interval", key, "at most 3.33 ms, the frames' interval"):
+        track_video(timed(clip), SPECIMEN, SCALE, setup=setup)
+    rounded = RecordingSetup(exposure=0.0034)
+    assert np.isfinite(track_video(timed(clip), SPECIMEN, SCALE, setup=rounded).displacement).any()
+
+
+def test_what_lasts_too_long_is_told_before_all_is_tracked(clip: list[np.ndarray]) -> None:
+    endless = (Frame(index, index / 300, clip[0]) for index in count())
+    with refused("longer than the interval", "exposure"):
+        list(within_interval(endless, {"exposure": 0.05}))
+    assert next(endless).index < 100
+
+
+def test_a_track_without_a_pose_is_refused(
+    clip: list[np.ndarray], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As all are that no polynomial in time tells at their frames."""
+
+    def told(motion: np.ndarray, sigma: np.ndarray, *_: object) -> tuple[np.ndarray, ...]:
+        return motion, sigma, np.full_like(motion, np.inf)
+
+    monkeypatch.setattr(video_tracking, "at_frame_times", told)
+    with refused("no unit has a pose in any frame", remedy="exposure"):
+        track_video(timed(clip), SPECIMEN, SCALE, setup=RecordingSetup(exposure=0.002))
 
 
 def test_units_are_found_again_after_a_black_frame(clip: list[np.ndarray]) -> None:
