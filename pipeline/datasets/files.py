@@ -17,7 +17,6 @@ from pipeline.runtime import UNREADABLE, UserError, write_atomically
 _CHUNK = bytes(1 << 20)
 _MOST = 1100
 """Bytes of data in a byte of a file: deflate makes nothing smaller than by 1032."""
-_REMEDY = "delete it and run the stage that makes it again"
 
 Loaded = TypeVar("Loaded")
 
@@ -64,7 +63,7 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
             has it.
     """
     path = Path(path)
-    remedy = _REMEDY
+    remedy = _remedy(path)
     sealed, dataset = _opened(path, _loaded)
     _check_origin(dataset, path, kind, remedy)
     dataset = migrate(dataset, kind)
@@ -92,7 +91,7 @@ def read_attributes(path: str | Path) -> Mapping[str, Any]:
 
 def _opened(path: Path, load: Callable[[Path], Loaded]) -> tuple[seal.State, Loaded]:
     """Checks the seal of a file and loads from it."""
-    remedy = _REMEDY
+    remedy = _remedy(path)
     try:
         sealed = seal.check_seal(path)
         if sealed == "broken":
@@ -107,11 +106,18 @@ def _opened(path: Path, load: Callable[[Path], Loaded]) -> tuple[seal.State, Loa
         raise UserError("not a readable netCDF file", file=path, remedy=remedy) from error
 
 
+def _remedy(path: Path) -> str:
+    """Tells to make a dataset again; a file of another name may be the user's own, and stays."""
+    if path.suffix == ".nc":
+        return "delete it and run the stage that makes it again"
+    return "give a dataset of this workflow, such as design.nc"
+
+
 def _check_kept(attributes: dict[Any, Any], sealed: seal.State, path: Path) -> None:
     """Takes the words about a seal off the attributes; refuses a file that has lost it."""
     if attributes.pop(seal.ATTRIBUTE, None) is not None and sealed == "absent":
         what = "its seal is missing: it was cut off, or changed by other software"
-        remedy = f"{_REMEDY}; or remove this attribute, if the change was meant"
+        remedy = f"{_remedy(path)}; or remove this attribute, if the change was meant"
         raise UserError(what, file=path, key=seal.ATTRIBUTE, remedy=remedy)
 
 

@@ -152,8 +152,13 @@ def test_a_foreign_or_missing_file_is_refused(tmp_path: Path) -> None:
         read(foreign, "sweep")
     text = tmp_path / "text.nc"
     text.write_text("no netCDF", encoding="utf-8")
-    with refused("not a readable netCDF file"):
+    with refused("not a readable netCDF file", remedy="delete it and run"):
         read(text, "sweep")
+    film = tmp_path / "film.mp4"
+    film.write_bytes(b"the user's own")
+    with refused("not a readable netCDF file", remedy="give a dataset") as caught:
+        read(film, "sweep")
+    assert "delete" not in str(caught.value.remedy)
     with refused("no such dataset", remedy="run the stage"):
         read(tmp_path / "sweep.nc", "sweep")
     with refused("", file=text / "sweep.nc"):
