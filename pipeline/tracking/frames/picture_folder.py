@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from itertools import takewhile
 from pathlib import Path
 
+import numpy as np
+
 from pipeline.runtime import Picture, UserError
 from pipeline.tracking.frames.frame import Frame, broken_off, untimed
 from pipeline.tracking.frames.picture import brightness, full_scale, page_count, read_levels
@@ -15,6 +17,8 @@ _SUFFIXES = {".png", *_PAGED}
 
 def read_folder(path: Path, start: float, end: float, rate: float | None) -> Iterator[Frame]:
     """Yields the pictures of a time window, s; the first of the folder is at zero.
+
+    Numbers that are missing among their names are frames that are missing.
 
     Raises:
         UserError: there are none, the first cannot be read, or no rate is given.
@@ -27,14 +31,38 @@ def read_folder(path: Path, start: float, end: float, rate: float | None) -> Ite
 
 
 def _pictured(path: Path, rate: float) -> Iterator[Frame]:
-    count = 0
+    count, times = 0, [place / rate for place in places(path)]
     try:
         for count, image in enumerate(images(path), start=1):
-            yield Frame(count - 1, (count - 1) / rate, image)
+            yield Frame(count - 1, times[count - 1], image)
     except UserError as error:
         if count == 0:
             raise
-        raise broken_off(path, f"{error.file} cannot be read", count, (count - 1) / rate) from error
+        raise broken_off(path, f"{error.file} cannot be read", count, times[count - 1]) from error
+
+
+def places(folder: Path) -> list[int]:
+    """Numbers the folder's pictures, from zero, by the counter in their names.
+
+    Its smallest step is that of a frame; where names differ in more than a counter, or steps are
+    no multiples of one, none is taken to be missing.
+
+    Raises:
+        UserError: there are none.
+    """
+    found = pictures(folder)
+    plain = list(range(len(found)))
+    if len({_wording(path) for path in found}) > 1:
+        return plain
+    numbers = np.array([_numbers(path)[0] for path in found])
+    counters = np.flatnonzero((numbers != numbers[0]).any(axis=0))
+    if len(counters) != 1:
+        return plain
+    counted = numbers[:, counters[0]] - numbers[0, counters[0]]
+    step = np.diff(counted).min()
+    if step < 1 or (counted % step).any():
+        return plain
+    return [int(place) for place in counted // step]
 
 
 def pictures(folder: Path) -> list[Path]:
@@ -65,6 +93,11 @@ def _listed(folder: Path) -> list[Path]:
 
 def _numbers(path: Path) -> tuple[list[int], str]:
     return [int(digits) for digits in re.findall(r"\d+", path.stem)], path.name
+
+
+def _wording(path: Path) -> str:
+    """Returns a picture's name without its numbers."""
+    return re.sub(r"\d+", "0", path.stem)
 
 
 def images(folder: Path) -> Iterator[Picture]:

@@ -18,7 +18,7 @@ from pipeline.tracking.frames.frame_times import (
     goes_on,
     stream_length,
 )
-from pipeline.tracking.frames.picture_folder import pictures, read_folder
+from pipeline.tracking.frames.picture_folder import pictures, places, read_folder
 
 _KINDS = {
     ".mp4": "mov",
@@ -116,7 +116,7 @@ def own_rate(path: Path) -> float | None:
 def video_length(path: Path, rate: float | None = None) -> float:
     """Reads how long a video is, s, at a rate if one is given; infinite where nothing tells."""
     if path.is_dir():
-        return len(pictures(path)) / rate if rate else math.inf
+        return (places(path)[-1] + 1) / rate if rate else math.inf
     try:
         with open_video(path) as container:
             return stream_length(container, container.streams.video[0], rate)

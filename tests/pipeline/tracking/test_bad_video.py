@@ -20,6 +20,7 @@ from pipeline.tracking.frames import (
     import_video,
     read_frames,
     read_pictures,
+    video_length,
     within_interval,
 )
 from pipeline.tracking.geometry import outlines_of_design
@@ -137,6 +138,34 @@ def test_pictures_of_16_bit_in_a_folder_are_a_video(tmp_path: Path, clip: list[n
     read = list(read_frames(tmp_path, rate=50.0))
     assert [frame.time for frame in read] == [0.0, 0.02, 0.04, 0.06]
     np.testing.assert_allclose(read[3].image, clip[3], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("names", "times"),
+    [
+        (["000", "001", "004", "005"], [0.0, 1.0, 4.0, 5.0]),
+        (["run2_10", "run2_20", "run2_50", "run2_60"], [0.0, 1.0, 4.0, 5.0]),
+        (["f0033", "f0066", "f0100", "f0133"], [0.0, 1.0, 2.0, 3.0]),
+        (["d1_t5", "d1_t9", "d2_t0", "d2_t7"], [0.0, 1.0, 2.0, 3.0]),
+        (["a1", "b2", "b3", "b9"], [0.0, 1.0, 2.0, 3.0]),
+        (["1", "01", "2", "5"], [0.0, 1.0, 2.0, 3.0]),
+        (["a", "b", "c", "d"], [0.0, 1.0, 2.0, 3.0]),
+        (["5" * 30, "5" * 29 + "6", "5" * 29 + "8", "5" * 29 + "9"], [0.0, 1.0, 3.0, 4.0]),
+        (["7"], [0.0]),
+    ],
+)
+def test_missing_numbers_are_gaps(
+    tmp_path: Path, clip: list[np.ndarray], names: list[str], times: list[float]
+) -> None:
+    """Of the one counter in the names, if its steps are multiples of one."""
+    for name, image in zip(names, clip, strict=False):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), image)
+    read = list(read_frames(tmp_path, rate=1.0))
+    assert [frame.time for frame in read] == times
+    assert [frame.index for frame in read] == list(range(len(names)))
+    assert video_length(tmp_path, 1.0) == times[-1] + 1.0
+    late = read_frames(tmp_path, times[-1], rate=1.0)
+    assert [frame.index for frame in late] == [len(names) - 1]
 
 
 @pytest.mark.parametrize("bits", [10, 12, 16])
