@@ -41,6 +41,7 @@ from pipeline.tracking.frames import (
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import as_built, clamped_units, outlines_of_design
 from pipeline.tracking.motion import (
+    DROPPED,
     Patch,
     Track,
     follow_patch,
@@ -57,6 +58,7 @@ from pipeline.tracking.output import (
     write_track_table,
 )
 from pipeline.tracking.reference_frame import RecordingSetup, proposal
+from sim.core import Floats, Ints
 
 LOG = logging.getLogger(__name__)
 
@@ -321,6 +323,22 @@ def readout_of(asked: Recording, video: Path, source: Path) -> float:
     return -asked.readout if shown.rows_reversed else asked.readout
 
 
+def warn_of_times(time: Floats, timing: Ints, video: Path) -> None:
+    """Warns of times (frames,), s, that have gaps, or that have none where frames are missing."""
+    gaps = np.count_nonzero(timing == DROPPED)
+    if not has_uneven_intervals(time):
+        if gaps:
+            LOG.warning(
+                "by the motion, frames were dropped in %d gaps, which the times do not have: later"
+                " ones may be too early",
+                gaps,
+            )
+    elif video.is_dir():
+        LOG.warning("numbers are missing among the pictures' names; times have gaps there")
+    else:
+        LOG.warning("the frame rate varies; times are the file's own stamps")
+
+
 def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) -> Track:
     """The track of a recording, told about in a line at its end.
 
@@ -343,8 +361,7 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
     )
     with found_in(source), cli.progress(frame_count(video), "tracking") as bar:
         track = track_video(shown, outlines_of_design(design), scale, bar.update, setup)
-    if has_uneven_intervals(track.time):
-        LOG.warning("the frame rate varies; times are the file's own stamps")
+    warn_of_times(track.time, track.timing, video)
     lost = float(np.mean(track.quality != 0))
     place, turn = median_uncertainty(track.sigma)
     LOG.info(

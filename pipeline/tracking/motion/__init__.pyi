@@ -1,3 +1,5 @@
+from .frame_timing import DROPPED as DROPPED
+from .frame_timing import STEADY as STEADY
 from .rigid_patch import Patch as Patch
 from .rigid_patch import find_motion as find_motion
 from .rigid_patch import fit_motion as fit_motion

@@ -51,7 +51,7 @@ class TrackQuality(NamedTuple):
     lost: Floats  # (frames, reasons) part of the units that are missing, by reason
     reasons: tuple[str, ...]  # their names
     duplicates: list[int]  # numbers of the frames
-    dropped: list[int]  # likewise
+    dropped: list[int]  # likewise of those before which some are missing, one a gap
     fastest: float  # largest step of a unit from frame to frame, px
     irregular: float  # spread of the frames' intervals, relative to their median
     residual: float  # root mean square of the first frame's residuals, px

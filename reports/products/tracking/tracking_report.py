@@ -102,9 +102,10 @@ def _lines(track: xr.Dataset, found: TrackQuality) -> Iterator[tuple[str, str, s
     own = "of the specimen's own make, as far as outlines tell it"
     yield "First frame less design", f"{found.residual:.3f} px", own
     yield "Units lost", f"{100 * found.lost.sum(axis=1).mean():.3g} %", "of units and frames"
-    for label, numbers in (("Repeated", found.duplicates), ("Dropped", found.dropped)):
+    gaps = "Gaps of dropped frames"
+    for label, numbers in (("Repeated frames", found.duplicates), (gaps, found.dropped)):
         told = ", ".join(map(str, numbers[:12])) + (", …" if len(numbers) > 12 else "")
-        yield f"{label} frames", str(len(numbers)), told
+        yield label, str(len(numbers)), told
     whole = f"{100 * found.stream.alone:.0f} % of the frames are held whole"
     rest = "" if found.stream.alone > 0.995 else ", the others as changes"
     yield "Codec", found.stream.codec, whole + rest

@@ -9,7 +9,9 @@ import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
+from pipeline.stages.track import warn_of_times
 from pipeline.tracking.frames import import_video
+from pipeline.tracking.motion import DROPPED, STEADY
 from tests import tables
 from tests.pipeline.conftest import Failing
 from tests.pipeline.tracking.conftest import CLIPS
@@ -213,6 +215,25 @@ def test_a_log_beside_the_track_is_refused_before_the_tracking(
     assert "units;" not in words
     assert log.read_text(encoding="utf-8") == "time,force\n0,0\n"
     assert not recording.with_name("track.nc").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "stamps", "told"),
+    [
+        ("v.mp4", [0, 1, 2, 3, 4, 5], "by the motion, frames were dropped in 2 gaps"),
+        ("v.mp4", [0, 1, 2, 6, 7, 8], "the frame rate varies"),
+        ("pictures", [0, 1, 2, 6, 7, 8], "numbers are missing"),
+        ("v.mp4", [0, 1, 2, 3, 4, 5], ""),
+    ],
+)
+def test_gaps_in_time_are_told(
+    name: str, stamps: list[int], told: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Those that only the motion tells make later times wrong."""
+    (tmp_path / "pictures").mkdir()
+    timing = np.where(np.isin(np.arange(6), [3, 5]), DROPPED if told else STEADY, STEADY)
+    warn_of_times(np.array(stamps) / 30, timing, tmp_path / name)
+    assert [line[: len(told)] for line in caplog.messages] == ([told] if told else [])
 
 
 @cases("tracking", "changes, key, what")

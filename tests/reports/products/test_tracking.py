@@ -112,7 +112,7 @@ def test_advice_names_what_is_wrong(track: xr.Dataset, change: dict[str, Any], t
     assert told in line
     first, second, *_ = advice.advice(of(track))  # what is lost and repeated comes first
     assert "hidden" in first
-    assert "1 repeated" in second
+    assert "Gaps where frames were dropped: 0; repeated frames: 1." in second
 
 
 @pytest.mark.parametrize(
