@@ -39,6 +39,7 @@ from pipeline.tracking.reference_frame import (
     check_outlines,
     outlines_seen,
     recognise,
+    start_doubt,
 )
 from sim.core import Floats, Ints, Mask, Reals, Singles
 
@@ -143,6 +144,9 @@ def track_video(
     sigma = np.where(np.isfinite(motion), np.hypot(sigma, np.sqrt(missed)), np.nan)
     vague = _vague(sigma, calibration.pixel)
     motion[vague], sigma[vague], qualities[vague] = np.nan, np.nan, POOR_FIT
+    moved = motion[..., :2].astype(float)
+    if doubt := start_doubt(moved, specimen.centre, calibration.residual, calibration.pixel):
+        LOG.warning(doubt)
     start = float(times[0])
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended, rest)
 

@@ -9,3 +9,4 @@ from .recognition import recognise as recognise
 from .rest_places import RestPlaces as RestPlaces
 from .still_frames import StillFrames as StillFrames
 from .still_frames import average_at_rest as average_at_rest
+from .still_frames import start_doubt as start_doubt

@@ -1,4 +1,4 @@
-"""Averages the frames in which a specimen rests before it moves, and measures their noise."""
+"""Averages frames in which a specimen rests before it moves; tells noise, and a start in motion."""
 
 import itertools
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.runtime import Picture
 from pipeline.tracking.frames import BrokenOffError, Frame
-from sim.core import Singles
+from sim.core import Floats, Singles
 
 _MOST, _MEMORY = 64, 1 << 27
 """Frames, and pixels of all, that are averaged at most."""
@@ -21,6 +21,17 @@ _ROUNDED = 0.41
 _LAPLACE = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32) / 6
 """Passes noise with its standard deviation, but no plane (Immerkaer, CVIU 64 (1996) 300)."""
 _NORMAL = 0.6745
+_SPAN = 4
+"""Frames, about, over which motion shows at the start."""
+_STEADY = 0.35
+"""Part of the way that lies in the first half of them, at least, of what moves already: half of it
+at a steady speed, a quarter from rest, all of it where noise alone is seen."""
+_SEEN = 0.1
+"""Least way in them, px: a codec moves units by up to 0.06 px that rest."""
+_OWN, _FAR = 0.05, 0.3
+"""Root mean square of what units are off the design, mm, that motion may add to, and that is more
+than the tolerance of a specimen."""
+_FEWEST = 6
 
 
 class StillFrames(NamedTuple):
@@ -99,3 +110,42 @@ def _noise_between(mean: Singles, image: Picture, count: int) -> float | None:
     if float(np.mean(blocks**2)) > _ALIKE or float(np.abs(blocks).max()) > _JUMP:
         return None
     return spread / float(np.sqrt(1 + 1 / count))
+
+
+def start_doubt(motion: Floats, centre: Floats, residual: Floats, pixel: float) -> str:
+    """Says why scale and motions may be wrong; nothing where all is well.
+
+    Where the specimen rests it is off the design by its tolerance alone, which motion adds to.
+
+    Args:
+        motion: (frames, units, 2) displacements, mm, NaN where missing.
+        centre: (units, 2) of the design, mm.
+        residual: (units, 2) where the first frame shows units less where the design has them, px.
+        pixel: its size, mm.
+    """
+    told = residual[np.isfinite(residual)]
+    off = float(np.sqrt(np.mean(told**2))) * pixel if told.size else 0.0
+    moves = off > _OWN and _moves(motion, centre, _SEEN * pixel)
+    if not moves and off <= _FAR:
+        return ""
+    why = "the specimen moves from the first frame on" if moves else "check the design, too"
+    return (
+        f"units of the first frame are {off:.2g} mm off the design: scale and motions may be wrong;"
+        f" start the window where the specimen rests ({why})"
+    )
+
+
+def _moves(motion: Floats, centre: Floats, least: float) -> bool:
+    """Tells motion (frames, units, 2) that goes on in the first frames, but for the camera's."""
+    half = min(_SPAN, len(motion) - 1) // 2
+    if half < 1:
+        return False
+    change = motion[[half, 2 * half]] - motion[0]
+    known = np.isfinite(change).all(axis=(0, 2))
+    if known.sum() < _FEWEST:
+        return False
+    # an affine motion may be a hand-held camera's, and leaves nothing off the design
+    basis = np.linalg.qr(np.column_stack([np.ones(known.sum()), centre[known]]))[0]
+    rest = change[:, known] - basis @ (basis.T @ change[:, known])
+    early, late = np.sqrt(np.mean(rest**2, axis=(1, 2)))
+    return bool(late > least and _STEADY * late < early < late)
