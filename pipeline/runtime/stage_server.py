@@ -50,7 +50,7 @@ class _Request(NamedTuple):
 
 
 def start(module: str = __name__) -> None:
-    """Starts the server of this process's jobs; it ends after this process, and its last stage.
+    """Starts the server of this process's jobs; it ends with this process, and its stages too.
 
     Where no socket can be made, jobs do their work themselves.
     """
@@ -166,6 +166,7 @@ class _Server:
     def __init__(self, listener: socket.socket, life: int, ended: int) -> None:
         self._waiting = selectors.DefaultSelector()
         self._jobs: set[_Job] = set()
+        self._patience: float | None = None  # seconds that stages get to end by themselves
         self._listener, self._life, self._ended = listener, life, ended
         self._wait_for(listener.fileno(), self._accept)
         self._wait_for(life, self._finish)
@@ -174,7 +175,10 @@ class _Server:
     def serve(self) -> _Request | None:
         """Serves until the workflow has ended, and its stages. In a fork: returns what to run."""
         while self._listener.fileno() >= 0 or self._jobs:
-            for key, _ in self._waiting.select():
+            ready = self._waiting.select(self._patience)
+            if not ready:
+                self._signal_stages(signal.SIGKILL)
+            for key, _ in ready:
                 if self._waiting.get_map().get(key.fd) is not key:  # its stage has just ended
                     continue
                 if request := key.data():
@@ -185,9 +189,16 @@ class _Server:
         self._waiting.register(descriptor, selectors.EVENT_READ, then)
 
     def _finish(self) -> None:
+        """Ends the stages of a workflow that was killed: one that ends by itself has none left."""
         self._waiting.unregister(self._life)
         self._waiting.unregister(self._listener)
         self._listener.close()
+        self._patience = cli.GRACE
+        self._signal_stages(signal.SIGTERM)
+
+    def _signal_stages(self, number: int) -> None:
+        for job in self._jobs:
+            os.kill(job.process, number)
 
     def _accept(self) -> _Request | None:
         client, _ = self._listener.accept()

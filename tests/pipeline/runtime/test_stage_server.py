@@ -13,7 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from pipeline.runtime import ROOT, stage_server
+from pipeline.runtime import ROOT, cli, stage_server
 
 PROGRAM = """
 import os, signal, sys, time
@@ -38,6 +38,13 @@ import sys
 from pipeline.runtime import delegate
 code = delegate("program", "colorsys")
 sys.exit(99 if code is None else code)
+"""
+WORKFLOW = """
+import signal, subprocess, sys
+from pipeline.runtime import stage_server
+stage_server.start()
+subprocess.Popen([sys.executable, "-c", sys.argv[1], "sleep"])
+signal.pause()
 """
 IMPORTS = """
 import importlib, os, pipeline
@@ -146,6 +153,51 @@ def test_a_signal_reaches_the_stage(folder: Path, number: int, code: int) -> Non
     if number == signal.SIGKILL:  # the server sees it a little later
         psutil.wait_procs([stage], timeout=30)
     assert not stage.is_running()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="there is no server")
+def test_a_killed_workflow_takes_its_stages_along(folder: Path) -> None:
+    workflow = subprocess.Popen(
+        [sys.executable, "-c", WORKFLOW, CLIENT],
+        cwd=folder,
+        env=ENVIRONMENT | {"PYTHONPATH": f"{folder}:{ROOT}"},
+    )
+    stage = sleeping(folder)
+    left = psutil.Process(workflow.pid).children(recursive=True)
+    assert stage in left
+    assert len(left) == 3, "a server, its client and their stage"
+    workflow.kill()
+    workflow.wait()
+    assert not psutil.wait_procs(left, timeout=30)[1]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="there is no server")
+def test_a_stage_that_does_not_end_with_its_workflow_is_killed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(cli, "GRACE", 0.1)
+    life, held = os.pipe()
+    ended, wake = os.pipe()  # the stage alone holds its end: the other is read at its end
+    ours, client = socket.socketpair()
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    if not (process := os.fork()):
+        os.close(held)  # or the workflow would seem to live
+        time.sleep(60)
+        os._exit(0)
+    signal.signal(signal.SIGTERM, before)
+    os.close(wake)
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind("")
+        listener.listen()
+        server = stage_server._Server(listener, life, ended)
+        server._watch(stage_server._Job(process, ours))
+        os.close(held)
+        assert server.serve() is None
+    killed = (-signal.SIGKILL).to_bytes(2, signed=True)
+    assert client.recv(3) == stage_server._TAKEN_UP + killed
+    client.close()
+    os.close(life)
+    os.close(ended)
 
 
 @pytest.mark.usefixtures("server")
