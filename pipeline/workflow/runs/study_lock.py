@@ -59,7 +59,7 @@ def check_free(folder: Path) -> None:
             raise refusal(path, error) from error
         # a lock that another host holds is not seen on every file system
         if holder and holder.may_live and not (locks and holder.here):
-            remedy = f"wait for it, or end it there with: kill -INT {holder.process}"
+            remedy = f"wait for it, or end it there with: kill -9 {holder.process}"
             raise UserError(
                 f"a run may be at work on {path.name} (process {holder})",
                 file=path,
@@ -91,7 +91,7 @@ def _lock(file: TextIO, path: Path) -> bool:
         remedy = "wait for it"
         if holder:
             what += f" (process {holder})"
-            remedy += f", or end it there with: kill -INT {holder.process}"
+            remedy += f", or end it there with: kill -9 {holder.process}"
         raise UserError(what, file=path, remedy=remedy) from error
     except OSError as error:
         if error.errno in _WITHOUT_LOCKS:
