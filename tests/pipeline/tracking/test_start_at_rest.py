@@ -1,4 +1,4 @@
-"""What a track that does not start at rest says of it, on motions that are made up."""
+"""A track that does not start at rest says so, on motions that are made up."""
 
 from collections.abc import Callable
 

@@ -117,7 +117,7 @@ def in_cases(study: StudyResults, degrees: list[float]) -> StudyResults:
 
 
 def test_the_largest_error_is_that_of_any_load_case(smile: StudyResults) -> None:
-    """Where a mean over the cases would be two thirds of it."""
+    """A mean over the cases would be two thirds of it."""
     one = {fact.key: fact for fact in facts.error_facts(smile)}
     two = {fact.key: fact for fact in facts.error_facts(in_cases(smile, [0.0]))}
     for name in ("altered", "cloaked"):
