@@ -44,6 +44,11 @@ class Run(NamedTuple):
         """Tells whether it is at work, as far as this host sees: a run on another one may be."""
         return not self.here or _is_snakemake(self.process)
 
+    @property
+    def remedy(self) -> str:
+        """Tells how to come after it; a run that is killed takes its stages along."""
+        return f"wait for it, or end it there with: kill -9 {self.process}"
+
 
 def _is_snakemake(process: int) -> bool:
     """Tells a run, however it was started, from what got its number after its end."""

@@ -59,11 +59,10 @@ def check_free(folder: Path) -> None:
             raise refusal(path, error) from error
         # a lock that another host holds is not seen on every file system
         if holder and holder.may_live and not (locks and holder.here):
-            remedy = f"wait for it, or end it there with: kill -9 {holder.process}"
             raise UserError(
                 f"a run may be at work on {path.name} (process {holder})",
                 file=path,
-                remedy=f"{remedy}; if it has ended, remove this file",
+                remedy=f"{holder.remedy}; if it has ended, remove this file",
             )
 
 
@@ -88,10 +87,9 @@ def _lock(file: TextIO, path: Path) -> bool:
     except BlockingIOError as error:
         holder = _holder(file)
         what = f"another run is at work on {path.name}"
-        remedy = "wait for it"
         if holder:
             what += f" (process {holder})"
-            remedy += f", or end it there with: kill -9 {holder.process}"
+        remedy = holder.remedy if holder else "wait for it"
         raise UserError(what, file=path, remedy=remedy) from error
     except OSError as error:
         if error.errno in _WITHOUT_LOCKS:
