@@ -15,6 +15,7 @@ from pipeline.workflow import (
     rule_inputs,
     studies,
 )
+from pipeline.workflow.runs import interrupts
 from reports.catalogue import REPORTS
 from reports.paper_figures import paper_figures, paper_movies
 

@@ -20,7 +20,7 @@ onstart:
         rule_inputs.check_room("results")
     rule_inputs.hold_studies(made)
     if not workflow.non_local_exec:
-        stage_server.start()
+        interrupts.end_jobs(spared=stage_server.start())
     first_look.show(
         f"{job.wildcards.name}{job.wildcards.preset}"
         for job in workflow.dag.needrun_jobs()

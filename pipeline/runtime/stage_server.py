@@ -49,13 +49,14 @@ class _Request(NamedTuple):
     environment: dict[str, str]
 
 
-def start(module: str = __name__) -> None:
+def start(module: str = __name__) -> int | None:
     """Starts the server of this process's jobs; it ends with this process, and its stages too.
 
-    Where no socket can be made, jobs do their work themselves.
+    Returns:
+        The server's process; None where no socket can be made: jobs do their work themselves.
     """
     if sys.platform != "linux":
-        return
+        return None
     path = Path(tempfile.mkdtemp(prefix="metacloak-")) / "stages"
     listener = socket.socket(socket.AF_UNIX)
     try:
@@ -64,7 +65,7 @@ def start(module: str = __name__) -> None:
         LOG.warning("stages start one by one, which takes longer: %s: %s", path, error)
         listener.close()
         path.parent.rmdir()
-        return
+        return None
     listener.listen(128)
     life, held = os.pipe()  # the server reads its end when this process ends, however it does
     handed = (listener.fileno(), life)
@@ -75,6 +76,7 @@ def start(module: str = __name__) -> None:
     os.close(life)
     listener.close()
     os.environ[SOCKET] = str(path)
+    return server.pid
 
 
 def delegate(program: str, imports: str) -> int | None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from pipeline.runtime import RUN_MARK
 from tests.e2e.checkout import Checkout, wait_until
 from tests.workflow.conftest import Sandbox
 
@@ -16,6 +17,10 @@ DESIGN, OTHER = "results/fig2/design.nc", "results/fig4/design.nc"
 
 def jobs(root: Path) -> list[psutil.Process]:
     return Checkout(root).jobs()
+
+
+def _is_of(run: subprocess.Popen[str], job: psutil.Process) -> bool:
+    return f":{run.pid} on " in job.environ()[RUN_MARK]
 
 
 def start(sandbox: Sandbox, target: str, more: int = 0) -> subprocess.Popen[str]:
@@ -37,10 +42,12 @@ def start(sandbox: Sandbox, target: str, more: int = 0) -> subprocess.Popen[str]
 def test_run_goes_on_after_a_kill_beside_another_study(sandbox: Sandbox) -> None:
     """Left-over jobs end, those of a run that is at work on another study do not."""
     sandbox.stage_seconds = 60.0
-    other = start(sandbox, OTHER)
-    theirs = jobs(sandbox.root)
-    run = start(sandbox, DESIGN, more=len(theirs))
-    left = [process for process in jobs(sandbox.root) if process not in theirs]
+    other = start(sandbox, OTHER, more=2)  # than the server and the first look
+    run = start(sandbox, DESIGN, more=len(jobs(sandbox.root)))
+    theirs, left = (
+        [process for process in jobs(sandbox.root) if _is_of(each, process)]
+        for each in (other, run)
+    )
     run.kill()
     run.wait()
     sandbox.stage_seconds = 0.0
@@ -67,6 +74,25 @@ def test_a_study_is_built_once_at_a_time_and_an_interrupt_leaves_no_job(sandbox:
     os.killpg(run.pid, signal.SIGINT)
     assert run.wait() != 0
     assert not jobs(sandbox.root)
+    assert sandbox.resume(DESIGN).returncode == 0
+
+
+@pytest.mark.parametrize("ignored", [False, True], ids=["", "ignored in the background"])
+def test_an_interrupt_of_a_run_alone_ends_its_jobs(sandbox: Sandbox, ignored: bool) -> None:
+    """As a scheduler or an editor sends it: its group may be a script's, which lives on."""
+    sandbox.stage_seconds = 60.0
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN if ignored else signal.SIG_DFL)
+    try:
+        run = start(sandbox, DESIGN, more=2)  # than the server and the first look
+    finally:
+        signal.signal(signal.SIGINT, before)
+    left = jobs(sandbox.root)
+    run.send_signal(signal.SIGINT)
+    told = run.communicate(timeout=40)[0]
+    assert run.returncode != 0
+    assert "Traceback" not in told
+    assert not psutil.wait_procs(left, timeout=10)[1]
+    sandbox.stage_seconds = 0.0
     assert sandbox.resume(DESIGN).returncode == 0
 
 

@@ -1,3 +1,4 @@
+from . import interrupts as interrupts
 from . import stale_jobs as stale_jobs
 from . import study_lock as study_lock
 from . import write_access as write_access
