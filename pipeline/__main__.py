@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from pipeline.runtime import PREFIX, STAGES, Stage, UserError, cli, delegate, streams, version
+from pipeline.workflow.runs import run_watch
 
 _HELP = ("-h", "--help")
 
@@ -39,7 +40,10 @@ def _delegated() -> int | None:
     stage = STAGES.get("".join(sys.argv[1:2]))
     if stage is None or stage.passes_on:
         return None
-    return delegate(f"{PREFIX}pipeline", PREFIX + stage.module)
+    code = delegate(f"{PREFIX}pipeline", PREFIX + stage.module)
+    if code is None:
+        run_watch.end_with_run()
+    return code
 
 
 def run_stage(name: str, words: Sequence[str]) -> int:

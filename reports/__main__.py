@@ -4,6 +4,7 @@ import sys
 from collections.abc import Sequence
 
 from pipeline.runtime import PREFIX, cli, delegate, streams
+from pipeline.workflow.runs import run_watch
 from reports.catalogue import OPTIONS, REPORTS, ReportCommand
 
 
@@ -40,4 +41,6 @@ def _run(kind: str, command: ReportCommand, words: Sequence[str]) -> int:
 if __name__ == "__main__":
     asked = REPORTS.get("".join(sys.argv[1:2]))
     code = delegate(f"{PREFIX}reports", PREFIX + asked.module) if asked else None
+    if code is None:
+        run_watch.end_with_run()
     cli.leave(main() if code is None else code)

@@ -96,6 +96,21 @@ def test_an_interrupt_of_a_run_alone_ends_its_jobs(sandbox: Sandbox, ignored: bo
     assert sandbox.resume(DESIGN).returncode == 0
 
 
+def test_without_a_server_stages_end_with_a_killed_run(
+    sandbox: Sandbox, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scratch = sandbox.root.with_name("scratch" * 20)  # longer than the name of a socket
+    scratch.mkdir()
+    monkeypatch.setenv("TMPDIR", str(scratch))
+    sandbox.stage_seconds = 60.0
+    run = start(sandbox, DESIGN)
+    wait_until(lambda: all(job.num_threads() > 1 for job in jobs(sandbox.root)), run, pause=0.05)
+    left = jobs(sandbox.root)
+    run.kill()
+    assert "stages start one by one" in run.communicate()[0]
+    assert not psutil.wait_procs(left, timeout=30)[1]
+
+
 def test_a_run_in_the_background_outlives_the_shell_that_began_it(sandbox: Sandbox) -> None:
     sandbox.stage_seconds = 60.0
     environment = sandbox.environment()
