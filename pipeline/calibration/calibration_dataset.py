@@ -86,6 +86,10 @@ def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate(parts)
 
 
+FRAGMENT = "lay it over the keys of a problem file."
+"""Ends the line that heads the lines `material:` of a problem file."""
+
+
 def material_fragment(fit: Fit, found: Estimate, title: str, *, synthetic: bool) -> str:
     """Writes the lines `material:` of a problem file, with the interval of each fitted value."""
     here = fit.model.constants(fit.unknowns)
@@ -100,7 +104,7 @@ def material_fragment(fit: Fit, found: Estimate, title: str, *, synthetic: bool)
     mark = [f"# {SYNTHETIC_LABEL}: found from computed data, not from a specimen."]
     lines = [
         *(mark if synthetic else []),
-        f"# {title or 'Calibration'}: lay it over the keys of a problem file.",
+        f"# {title or 'Calibration'}: {FRAGMENT}",
         "material:",
         f"  density: {here.material.density * 1e9:.6g} kg/m^2",
         *(_line(here, name, told) for name in _STIFFNESS),

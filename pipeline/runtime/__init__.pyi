@@ -2,6 +2,7 @@ from . import case_log as case_log
 from . import cli as cli
 from . import stage_server as stage_server
 from . import streams as streams
+from .atomic_write import begins_with as begins_with
 from .atomic_write import sidecar_path as sidecar_path
 from .atomic_write import write_atomically as write_atomically
 from .atomic_write import write_folder_atomically as write_folder_atomically

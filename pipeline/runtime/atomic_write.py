@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -10,20 +10,48 @@ import psutil
 
 from pipeline.runtime.errors import UserError, refusal
 
+_HEAD = 4096  # bytes of a file that hold the words by which its writer knows it
 
-def sidecar_path(out: Path, *sources: Path, suffix: str = ".yaml") -> Path:
-    """Names the file beside a result, which must be neither that nor one it is made of.
+
+def sidecar_path(
+    out: Path, *sources: Path, ending: str, is_own: Callable[[Path], bool], key: str = "--out"
+) -> Path:
+    """Names the file beside a result, which replaces none but one that the same stage wrote.
+
+    Args:
+        out: the result.
+        sources: what it is made of.
+        ending: of the file's name, after the result's stem.
+        is_own: tells whether the stage wrote a file that is there.
+        key: the option that chooses the place.
 
     Raises:
-        UserError: it is.
+        UserError: it would replace the result, a source or somebody's file.
     """
-    path = out.with_suffix(suffix)
-    for held in (out, *sources):
-        if path.resolve() == held.resolve():
-            what = "this file would be written over"
-            remedy = f"give the result another name or folder; {path.name} is put beside it"
-            raise UserError(what, file=held, key="--out", value=str(out), remedy=remedy)
+    path = out.with_name(out.stem + ending)
+    same = any(path.resolve() == held.resolve() for held in (out, *sources))
+    if same or (path.exists() and not is_own(path)):
+        what = "this file would be written over" + ("" if same else ", which this did not make")
+        remedy = f"give the result another name or folder; {path.name} is put beside it"
+        raise UserError(what, file=path, key=key, value=str(out), remedy=remedy)
     return path
+
+
+def begins_with(words: str) -> Callable[[Path], bool]:
+    """Makes a test of whether a file holds words near its beginning.
+
+    Raises:
+        UserError: by the test, of a file that cannot be read.
+    """
+
+    def test(path: Path) -> bool:
+        try:
+            with path.open("rb") as file:
+                return words.encode() in file.read(_HEAD)
+        except OSError as error:
+            raise refusal(path, error) from error
+
+    return test
 
 
 @contextmanager

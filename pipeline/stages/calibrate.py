@@ -14,7 +14,7 @@ from pipeline.calibration import (
 from pipeline.calibration.inputs import Calibration, has_synthetic, source_files
 from pipeline.datasets import provenance
 from pipeline.problem.reading import load_section
-from pipeline.runtime import UserError, sidecar_path, write_atomically
+from pipeline.runtime import UserError, begins_with, sidecar_path, write_atomically
 from sim.core import SimulationError
 
 LOG = logging.getLogger(__name__)
@@ -39,7 +39,10 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _fit(path: Path, args: argparse.Namespace) -> None:
-    asked, fragment = load_section(path, Calibration), sidecar_path(args.out, path)
+    asked = load_section(path, Calibration)
+    own = begins_with(calibration_dataset.FRAGMENT)
+    parents = source_files(asked, path.parent)
+    fragment = sidecar_path(args.out, path, *parents.values(), ending=".yaml", is_own=own)
     fit = fit_calibration(asked, path)
     try:
         made, found = calibration_dataset.assemble_calibration(fit)
@@ -47,7 +50,6 @@ def _fit(path: Path, args: argparse.Namespace) -> None:
         raise simulation_fault(error, path) from error
     for line in filter(None, made.attrs["warnings"].split("\n")):
         LOG.warning("%s", line)
-    parents = source_files(asked, path.parent)
     synthetic = asked.synthetic or has_synthetic(asked.data, path.parent)
     origin = provenance.of_recording(
         asked.model_dump_json(), parents, synthetic=synthetic, role="calibration"

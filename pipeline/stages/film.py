@@ -3,6 +3,7 @@
 import argparse
 import logging
 import os
+from contextlib import suppress
 from pathlib import Path
 
 import xarray as xr
@@ -10,7 +11,7 @@ import xarray as xr
 from pipeline import datasets
 from pipeline.datasets import SYNTHETIC_LABEL, provenance
 from pipeline.problem.sections import VirtualRecording, write_quantity
-from pipeline.runtime import UserError, cli, found_in, sidecar_path, write_atomically
+from pipeline.runtime import UserError, begins_with, cli, found_in, sidecar_path, write_atomically
 from pipeline.tracking.frames import Recording
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import outlines_of_design
@@ -27,6 +28,7 @@ from pipeline.virtual_lab import (
 LOG = logging.getLogger(__name__)
 
 SYNTHETIC = f"{SYNTHETIC_LABEL}: rendered from a simulation, not filmed"
+_WRITTEN = "Written by the stage film; python -m pipeline track takes it."
 
 
 def work(args: argparse.Namespace) -> None:
@@ -80,7 +82,8 @@ def _plan(args: argparse.Namespace) -> None:
 
 def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     asked, virtual = _virtual(path)
-    described = sidecar_path(out, path)
+    described = sidecar_path(out, path, ending=".yaml", is_own=begins_with(_WRITTEN))
+    truth = sidecar_path(out, response, design, ending="_truth.nc", is_own=_is_truth)
     if out.suffix not in virtual.codec.suffixes:
         what = f"{virtual.codec.name} does not go into such a file"
         raise UserError(what, file=out, remedy=f"name it *{virtual.codec.suffixes[0]}")
@@ -93,8 +96,8 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     with cli.progress(len(film.motion.time), f"rendering {path.stem}") as bar:
         encode_video(out, film.images(bar.update), virtual.rate, virtual.codec, labels)
     made = assemble_truth(film.response, film.present, film.motion, film.scene.view)
-    datasets.write(made, out.with_name(f"{out.stem}_truth.nc"), "truth", origin)
-    comments = (SYNTHETIC, "Written by the stage film; python -m pipeline track takes it.")
+    datasets.write(made, truth, "truth", origin)
+    comments = (SYNTHETIC, _WRITTEN)
     with write_atomically(described) as aside:
         text = recordings.recording_yaml(_described(asked, virtual, out, design), comments)
         aside.write_text(text, encoding="utf-8")
@@ -102,6 +105,13 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     if virtual.load_cell is not None and not log.exists():
         words = "`python -m pipeline film weigh` writes the log of its load cell, %s"
         LOG.info(words, log)
+
+
+def _is_truth(path: Path) -> bool:
+    with suppress(UserError):
+        datasets.read(path, "truth")
+        return True
+    return False
 
 
 def _weigh(path: Path, response: Path, out: Path) -> None:

@@ -5,6 +5,9 @@ import json
 import logging
 import os
 import shlex
+import struct
+import zlib
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +18,7 @@ from pipeline.datasets import SYNTHETIC_LABEL, provenance
 from pipeline.runtime import (
     PREFIX,
     UserError,
+    begins_with,
     cli,
     found_in,
     sidecar_path,
@@ -64,6 +68,9 @@ LOG = logging.getLogger(__name__)
 
 _MOVED = "x_px,y_px,u_px,v_px,rotation_deg"
 _ORANGE = (0, 80, 230)  # blue, green, red
+_DRAWN = "Software\0metacloak: python -m pipeline track"  # keyword and text of a PNG's chunk
+_PNG_HEAD = 33  # bytes of a PNG's signature and first chunk
+_IS_DRAWN = begins_with(_DRAWN)
 _UNTIMED = "frame_rate: how many pictures were taken in a second; without it they are not tracked"
 
 
@@ -105,8 +112,6 @@ def _points(path: Path, args: argparse.Namespace) -> None:
 
 
 def _init(video: Path, args: argparse.Namespace) -> None:
-    import cv2
-
     _check_positive("--pixel-size", args.pixel_size, "millimetres per pixel, or leave it out")
     design = datasets.read(args.design, "design")
     first, timed = _first_frame(video, args.start, args.frame_rate)
@@ -114,9 +119,10 @@ def _init(video: Path, args: argparse.Namespace) -> None:
     with found_in(video):
         found = proposal.propose(first.image, design, scale)
     doubts = found.doubts if timed else (*found.doubts, _UNTIMED)
-    out, drawn = (args.out_dir / f"{video.stem}{end}" for end in (".yaml", "_units.png"))
+    out = args.out_dir / f"{video.stem}.yaml"
     if out.exists():
         raise _there_is_one(out)
+    drawn = sidecar_path(out, video, ending="_units.png", is_own=_IS_DRAWN, key="--out-dir")
     values = {
         "title": video.stem,
         "video": os.path.relpath(video.resolve(), out.resolve().parent),
@@ -129,10 +135,7 @@ def _init(video: Path, args: argparse.Namespace) -> None:
         "synthetic": rendered(video) or None,
     }
     note = SYNTHETIC_LABEL if rendered(video) else ""
-    with write_atomically(drawn) as aside:
-        aside.write_bytes(
-            cv2.imencode(".png", proposal.draw_proposal(first.image, found, note))[1].tobytes()
-        )
+    _write_drawing(proposal.draw_proposal(first.image, found, note), drawn)
     with write_atomically(out) as aside:
         comments = ("What the first frame did not tell:", *doubts)
         aside.write_text(recording.recording_yaml(values, comments), encoding="utf-8")
@@ -175,7 +178,7 @@ def _pair(*pictures: Path, args: argparse.Namespace) -> None:
         usage = "python -m pipeline track pair FIRST.png LATER.png --at X Y --out motions.csv"
         raise UserError("two pictures, x and y of patches, and a file are wanted", remedy=usage)
     _check_positive("--side", args.side, "pixels, such as 41")
-    drawing = sidecar_path(args.out, *pictures, suffix=".png")
+    drawing = sidecar_path(args.out, *pictures, ending=".png", is_own=_IS_DRAWN)
     before, after = read_pictures(*pictures)
     centres = np.reshape(args.at, (-1, 2))
     for centre in centres:
@@ -197,8 +200,18 @@ def _pair(*pictures: Path, args: argparse.Namespace) -> None:
         cv2.polylines(drawn, [corners], True, _ORANGE, 1, cv2.LINE_AA, 4)
     with write_atomically(args.out) as aside:
         aside.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    with write_atomically(drawing) as aside:
-        aside.write_bytes(cv2.imencode(".png", drawn)[1].tobytes())
+    _write_drawing(drawn, drawing)
+
+
+def _write_drawing(picture: np.ndarray, path: Path) -> None:
+    """Writes a PNG with a text chunk (tEXt), by which a later call knows it for its own."""
+    import cv2
+
+    encoded = cv2.imencode(".png", picture)[1].tobytes()
+    text = b"tEXt" + _DRAWN.encode()
+    chunk = struct.pack(">I", len(text) - 4) + text + struct.pack(">I", zlib.crc32(text))
+    with write_atomically(path) as aside:
+        aside.write_bytes(encoded[:_PNG_HEAD] + chunk + encoded[_PNG_HEAD:])
 
 
 def _import(path: Path, args: argparse.Namespace) -> None:
@@ -209,15 +222,25 @@ def _import(path: Path, args: argparse.Namespace) -> None:
     text = import_video.recording_text(described, shown.resolve(), design.name)
     if out.exists() and out.read_text(encoding="utf-8") != text:
         raise _there_is_one(out)
+    described_by = provenance.file_hash(path)
+    if design.exists() and not _is_imported(design, described_by):
+        raise UserError("there is a design already", file=design, remedy="remove it, or --out-dir")
     origin = {
         "problem": "{}",
-        "problem_hash": provenance.file_hash(path),
-        "parents": json.dumps({"description": provenance.file_hash(path)}),
+        "problem_hash": described_by,
+        "parents": json.dumps({"description": described_by}),
     }
     datasets.write(import_video.design(described), design, "design", origin)
     with write_atomically(out) as aside:
         aside.write_text(text, encoding="utf-8")
     LOG.info("python -m pipeline track %s --out %s", out, "track.nc")
+
+
+def _is_imported(design: Path, described_by: str) -> bool:
+    """Tells whether a design was imported from the description with this hash."""
+    with suppress(UserError):
+        return bool(datasets.read(design, "design").attrs["problem_hash"] == described_by)
+    return False
 
 
 def _there_is_one(out: Path) -> UserError:

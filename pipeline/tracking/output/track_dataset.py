@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.datasets.tables import TABLES
-from pipeline.runtime import UserError, refusal, sidecar_path, write_atomically
+from pipeline.runtime import begins_with, sidecar_path, write_atomically
 from pipeline.tracking.motion import Track
 from sim.core import Floats, Ints, Mask, Reals
 
@@ -147,23 +147,7 @@ def track_table_path(out: Path, *sources: Path) -> Path:
     Raises:
         UserError: there is another one of that name, such as a log of forces.
     """
-    path = sidecar_path(out, *sources, suffix=".csv")
-    if path.exists() and not _is_track_table(path):
-        what = "this file would be written over, and is no table of tracks"
-        remedy = f"give the track another name or folder; {path.name} is put beside it"
-        raise UserError(what, file=path, key="--out", value=str(out), remedy=remedy)
-    return path
-
-
-def _is_track_table(path: Path) -> bool:
-    """Tells a table of tracks by its heading, which a note of a rendered video may precede."""
-    try:
-        with path.open("rb") as file:
-            first = [file.readline(len(_HEADING) + 2) for _ in range(2)]
-    except OSError as error:
-        raise refusal(path, error) from error
-    note, heading = (line.decode("utf-8", "replace").rstrip() for line in first)
-    return note == _HEADING or (note.startswith("# ") and heading == _HEADING)
+    return sidecar_path(out, *sources, ending=".csv", is_own=begins_with(_HEADING))
 
 
 def write_track_table(track: xr.Dataset, path: Path) -> None:

@@ -145,3 +145,12 @@ def test_the_constants_are_not_written_over_their_description(made: Path, failin
     told = failing("calibrate", [str(path), "--out", str(path.with_suffix(".nc"))])
     assert "would be written over" in told
     assert path.read_bytes() == before
+
+
+def test_the_constants_replace_no_problem_file(made: Path, failing: Failing) -> None:
+    """Of the same stem as the result; those of an earlier call are found anew."""
+    problem = made / "found.yaml"
+    problem.write_text("material: {}\n")
+    told = failing("calibrate", [str(made / "calibration.yaml"), "--out", str(made / "found.nc")])
+    assert "would be written over" in told
+    assert problem.read_text() == "material: {}\n"

@@ -1,15 +1,24 @@
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from pipeline.runtime import CaseLog, SweepResult, case_log, sidecar_path, write_atomically
+from pipeline.runtime import (
+    CaseLog,
+    SweepResult,
+    begins_with,
+    case_log,
+    sidecar_path,
+    write_atomically,
+)
 from tests.tables import refused
 
 OTHER = """
 import sys
+from functools import partial
 from pathlib import Path
 from pipeline.runtime import write_atomically
 with write_atomically(Path(sys.argv[1])) as aside:
@@ -31,10 +40,18 @@ def test_two_that_write_one_file_do_not_meet(tmp_path: Path) -> None:
 def test_what_is_put_beside_a_result_replaces_nothing(tmp_path: Path) -> None:
     """Neither the result, nor what it is made of: the log of a load cell beside its video."""
     log = tmp_path / "run1.csv"
-    assert sidecar_path(tmp_path / "track.nc", log, suffix=".csv") == tmp_path / "track.csv"
+    named = partial(sidecar_path, ending=".csv", is_own=begins_with("of a track"))
+    table = tmp_path / "track.csv"
+    assert named(tmp_path / "track.nc", log) == table
     for out in ("run1.nc", "other.csv"):
         with refused("would be written over", "--out"):
-            sidecar_path(tmp_path / out, tmp_path / "run1.yaml", log, suffix=".csv")
+            named(tmp_path / out, tmp_path / "run1.yaml", log)
+    for text in ("of a tree", ""):
+        table.write_text(text)
+        with refused("which this did not make", "--out", file=table, remedy="track.csv is put"):
+            named(tmp_path / "track.nc", log)
+    table.write_text("# of a track\n")
+    assert named(tmp_path / "track.nc", log) == table
 
 
 def test_what_a_killed_process_left_goes_and_what_a_living_one_writes_stays(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@ import json
 from pathlib import Path
 
 import av
+import cv2
 import numpy as np
 import pytest
 import yaml
@@ -54,6 +55,15 @@ def test_a_recording_that_was_edited_is_not_written_over(recording: Path, failin
     assert "frame_rate: 300 Hz" in recording.read_text(encoding="utf-8")
 
 
+def test_an_import_replaces_no_design(recording: Path, failing: Failing) -> None:
+    recording.unlink()
+    design = recording.with_name("f_silhouette_design.nc")
+    design.write_bytes(kept := b"of somebody")
+    words = ["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", str(recording.parent)]
+    assert "there is a design already" in failing("track", words)
+    assert design.read_bytes() == kept
+
+
 @pytest.mark.parametrize(("fps", "line"), [(2400, "frame_rate: 2400 Hz #"), (301, None)])
 def test_slow_motion_keeps_the_rate_of_its_description(fps: float, line: str | None) -> None:
     """A file of 300 frames per second keeps its own times unless it was filmed at another rate."""
@@ -91,7 +101,8 @@ def test_a_command_finds_turned_patches(tmp_path: Path, capsys: pytest.CaptureFi
     middle, other = np.loadtxt(out, delimiter=",", skiprows=1)[:, 2:]
     np.testing.assert_allclose(middle, [0.0, 0.0, -170.0], atol=0.02)
     np.testing.assert_allclose(other, [97.952, 160.569, -170.0], atol=0.02)
-    assert out.with_suffix(".png").exists()
+    drawing = out.with_suffix(".png")
+    assert cv2.imread(str(drawing)) is not None
     table = ["pair", *pictures, "--out", str(out)]
     assert run_stage("track", [*table, "--at", "5", "5"]) == 0
     assert "warning: nothing like the patch at 5, 5" in (told := capsys.readouterr().err)
@@ -104,6 +115,10 @@ def test_a_command_finds_turned_patches(tmp_path: Path, capsys: pytest.CaptureFi
     ):
         assert run_stage("track", wrong) == 2
         assert words in capsys.readouterr().err
+    drawing.write_bytes(Path(pictures[0]).read_bytes())
+    assert run_stage("track", [*table, "--at", *at]) == 2
+    assert f"{drawing}" in capsys.readouterr().err
+    assert drawing.read_bytes() == Path(pictures[0]).read_bytes()
 
 
 def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:

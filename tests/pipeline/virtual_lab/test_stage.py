@@ -123,6 +123,18 @@ def test_a_request_is_not_written_over(files: Path, tmp_path: Path, failing: Fai
     assert asked.read_bytes() == before
 
 
+@pytest.mark.parametrize("ending", [".yaml", "_truth.nc"])
+def test_a_film_replaces_nobodys_files(
+    files: Path, tmp_path: Path, failing: Failing, ending: str
+) -> None:
+    kept = tmp_path / f"clip{ending}"
+    kept.write_text("title: mine\n")
+    told = failing("film", words(files, recording(tmp_path), tmp_path / "clip.mp4"))
+    assert all(part in told for part in ("which this did not make", str(kept)))
+    assert kept.read_text() == "title: mine\n"
+    assert not (tmp_path / "clip.mp4").exists()
+
+
 @pytest.mark.parametrize("codec", ["h264", "ffv1"])
 def test_the_same_recording_gives_the_same_bytes(files: Path, tmp_path: Path, codec: str) -> None:
     asked = recording(tmp_path, end="0.1 s", codec={"name": codec})
