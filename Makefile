@@ -113,7 +113,8 @@ $(foreach study,$(STUDIES),$(eval $(call preset_of,$(study))))
 
 publish: setup
 	@$(BIN)/python -m pipeline publish $(or $(STUDY),fig2) --check
-	@$(BIN)/python -m pipeline run $(or $(STUDY),fig2) && $(BIN)/python -m pipeline publish $(or $(STUDY),fig2)
+	@exec $(BIN)/python -m pipeline run $(or $(STUDY),fig2)
+	@$(BIN)/python -m pipeline publish $(or $(STUDY),fig2)
 
 reproduce: setup
 	@$(BIN)/python -m pipeline reproduce $(STUDY)

@@ -322,6 +322,15 @@ def test_modules_of_a_cluster_hide_nothing(pretended: Path) -> None:
     assert "/of/a/module" not in shown.communicate()[0]
 
 
+@pytest.mark.parametrize("target", ["publish", "index"])
+def test_a_run_takes_the_place_of_the_shell_of_make(pretended: Path, target: str) -> None:
+    """Signals to what make began would end the shell alone."""
+    told = start(pretended, "--dry-run", target).communicate()[0]
+    (run,) = (line for line in told.splitlines() if "pipeline run" in line)
+    assert run.startswith("exec ")
+    assert "&&" not in run
+
+
 def test_a_preset_without_a_name_is_no_target(pretended: Path) -> None:
     problem = pretended / "experiments/fig2/problem.yaml"
     problem.parent.mkdir(parents=True)
