@@ -109,17 +109,20 @@ def check_template(
 ) -> Iterator[Fault]:
     """Checks holes against the scored outlines of units around them, where these are whole.
 
-    Several dots of a unit lie about its centroid; one lies there too if there is room for it. A
-    template that is split through units scores these by lines without a loop.
+    Several dots of a unit lie about its centroid; one lies there too if there is room for it, and
+    a small unit has none. A template that is split through units scores these by lines without a
+    loop.
     """
     outlines, _, open_lines, _ = shapely.polygonize_full(list(scored))
     left = list(holes)
     for outline in shapely.get_parts(outlines):
         mine = [hole for hole in left if outline.intersects(hole)]
         left = [hole for hole in left if hole not in mine]
+        if not mine:
+            continue
         middle = shapely.multipoints([hole.centroid for hole in mine]).centroid
         within = all(outline.contains(hole) for hole in mine)
-        off = middle.distance(outline.centroid) if mine else 0.0
+        off = middle.distance(outline.centroid)
         cramped = len(mine) == 1 and not outline.contains(_around(outline.centroid, mine[0]))
         if not within or (off > _OFF and not cramped):
             what = f"dots {off:.2f} mm off the middle of the unit that is scored around them"

@@ -58,3 +58,8 @@ def test_dots_of_a_unit_that_a_template_is_split_through_are_none_too_many(score
     assert [fault.what for fault in faults] == (
         [] if scored else ["2 dots in no unit that is scored"]
     )
+
+
+def test_a_unit_that_is_scored_may_be_too_small_for_a_dot() -> None:
+    template = Drawing(Path("template.dxf"), (), {})
+    assert not list(check_template(template, "TEMPLATE1", [], [shapely.box(0, 0, 3, 3).exterior]))
