@@ -118,7 +118,7 @@ def check_sheet(drawing: Drawing, laser: Laser, thickness: float) -> Iterator[Fa
                 remedy = "take thinner material, or ask for larger dots"
                 remedy = f"{remedy} (fabrication.markers.diameter)"
                 key = "laser.template_thickness"
-                if drawing.file.name.startswith("units"):
+                if drawing.file.name.startswith(("units", "coupon")):
                     remedy, key = "take thicker pins", "laser.pin"
                 yield drawing.fault(what, curve.part, (curve.line,), key, remedy)
     yield from _check_letters(drawing)

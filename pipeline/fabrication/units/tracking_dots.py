@@ -1,5 +1,7 @@
 """Places the tracking dots of a unit, and the holes for the pins that align its layers."""
 
+import math
+
 import numpy as np
 import shapely
 from scipy.spatial import distance
@@ -7,6 +9,7 @@ from shapely import Polygon
 
 from pipeline.fabrication.parts import Circle, Strokes
 from pipeline.problem.sections import Fabrication, Markers
+from pipeline.runtime import UserError
 
 _RIM = 0.2  # mm between a dot and the rim of the unit
 _CLEAR = 0.3  # mm between a hole and a letter
@@ -68,8 +71,16 @@ def pin_holes(outline: Polygon, written: Strokes, settings: Fabrication) -> tupl
     """Places two holes as far apart as walls and letters allow; one or none without room.
 
     A wall around a hole is as thick as those around slots, between two holes as well.
+
+    Raises:
+        UserError: the holes are narrower than a layer is thick, which no laser cuts.
     """
-    pin, wall = settings.laser.pin, settings.minimum_wall
+    pin, wall, layer = settings.laser.pin, settings.minimum_wall, settings.laser_sheet_thickness
+    if pin < layer:
+        what = f"pins of {pin:g} mm in layers of {layer:.3g} mm: a laser cuts no hole so narrow"
+        least = math.ceil(100 * layer - _GRID) / 100
+        remedy = f"give at least {least:g} mm; a smaller aspect_ratio makes thinner layers"
+        raise UserError(what, key="fabrication.laser.pin", value=f"{pin:g} mm", remedy=remedy)
     letters = shapely.MultiLineString(list(written)).buffer(pin / 2 + _CLEAR)
     room = outline.buffer(-(pin / 2 + wall + _CHORD)).difference(letters)
     if room.is_empty:
