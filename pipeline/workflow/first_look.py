@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from pipeline.runtime import PREFIX, WORK, UserError
-from pipeline.workflow.studies import Study, check_names, joints
+from pipeline.workflow.studies import Study, check_names, check_targets, joints
 from pipeline.workflow.target_words import built_by
 
 
@@ -16,8 +16,9 @@ def work(args: argparse.Namespace) -> None:
 
     Raises:
         UserError: there is no such study or preset, it or a recording has a name that none can
-            have, or a figure of several studies has it.
+            have or that a rule has, or a figure of several studies has it.
     """
+    check_targets()
     if members := joints().get(args.study):
         remedy = f"check each by its own name: {', '.join(map(str, members))}"
         raise UserError("a figure of several studies", key="study", value=args.study, remedy=remedy)

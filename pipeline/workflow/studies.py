@@ -175,6 +175,19 @@ def check_names(study: Study, root: Path = WORK) -> None:
         _check_name(what, name, path, root)
 
 
+def check_folder(word: str, root: Path = WORK) -> None:
+    """Refuses a word that is a folder of experiments with a name that no study can have.
+
+    An "@" in it would be read as the begin of a preset.
+
+    Raises:
+        UserError: the name has more than letters, digits and underscores.
+    """
+    folder = root / "experiments" / word
+    if "/" not in word and folder.is_dir():
+        _check_name("a study", word, folder, root)
+
+
 def _check_name(what: str, name: str, path: Path, root: Path) -> None:
     if not re.fullmatch(r"\w+", name):
         remedy = f"name it {re.sub(r'[^0-9A-Za-z]+', '_', name).strip('_') or 'mine'}"

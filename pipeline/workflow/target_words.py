@@ -11,6 +11,7 @@ from itertools import takewhile
 from pipeline.runtime import UserError
 from pipeline.workflow.studies import (
     Study,
+    check_folder,
     problem_of,
     rule_names,
     studies,
@@ -28,13 +29,14 @@ def check_words(words: Sequence[str]) -> None:
     One of these is refused where it is near a target.
 
     Raises:
-        UserError: naming the targets that may be meant.
+        UserError: naming the targets that may be meant, or a folder whose name no study can have.
     """
     known = {*targets(), *rule_names()}
     plain = [word for word in words if word not in _ALONE]
     leading = len(list(takewhile(lambda word: not word.startswith("-"), plain)))
     for place, word in enumerate(plain):
         named = without_product(word)
+        check_folder(named)
         if not _may_be_target(word) or Study.parse(named).name in known:
             continue
         if place < leading or _near(named, known):
@@ -45,8 +47,9 @@ def built_by(word: str) -> str:
     """Finds the folder of results that a target fills: that of a study or of a figure of several.
 
     Raises:
-        UserError: nothing, or no preset of the study, is named so.
+        UserError: nothing, or no preset of the study, is named so, or a study cannot be.
     """
+    check_folder(word)
     known = targets()
     if word in known:
         return known[word]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.__main__ import run_stage
-from pipeline.workflow import rule_inputs
+from pipeline.workflow import rule_inputs, studies
 from pipeline.workflow.studies import Study
 from pipeline.workflow.target_words import built_by, check_words
 from tests.pipeline.conftest import Failing
@@ -54,6 +54,24 @@ def test_stages_that_take_a_study_name_those_that_there_are(
     assert "is named nosuch" in told
     assert "name a target: fig2, fig3" in told
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_whose_name_no_study_can_have(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is refused by its name, and neither as a preset nor as a word that is near itself."""
+    (tmp_path / "experiments/my@study").mkdir(parents=True)
+    monkeypatch.setattr(studies.check_folder, "__defaults__", (tmp_path,))
+    for refuse in (built_by, lambda word: check_words(["fig2", word, f"{word}_sweep"])):
+        with refused("letters, digits and underscores only", remedy="name it my_study"):
+            refuse("my@study")
+
+
+def test_a_study_called_like_a_rule_is_refused_before_it_is_checked(
+    monkeypatch: pytest.MonkeyPatch, failing: Failing
+) -> None:
+    monkeypatch.setattr(studies, "rule_names", lambda: ("fig3",))
+    assert "the target fig3 would be both of fig3 and of a rule" in failing("check", ["fig3"])
 
 
 def test_a_figure_of_several_names_its_studies(capsys: pytest.CaptureFixture[str]) -> None:
