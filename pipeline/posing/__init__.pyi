@@ -51,6 +51,7 @@ from .to_scene import limits_of as limits_of
 from .to_scene import material_of as material_of
 from .to_scene import scene_of as scene_of
 from .to_scene import stiffness_factors as stiffness_factors
+from .variants import variant_faults as variant_faults
 from .verification import AS_RUN as AS_RUN
 from .verification import CheckResult as CheckResult
 from .verification import assemble_verification as assemble_verification

@@ -3,16 +3,16 @@
 import argparse
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from pipeline.runtime import PREFIX, WORK, UserError
-from pipeline.workflow.studies import Study, check_names, check_targets, joints
+from pipeline.workflow.studies import Study, check_names, check_targets, joints, studies
 from pipeline.workflow.target_words import built_by
 
 
 def work(args: argparse.Namespace) -> None:
-    """Shows one study.
+    """Shows one study, and poses its presets and designs: a preset's own where it names one.
 
     Raises:
         UserError: there is no such study or preset, it or a recording has a name that none can
@@ -24,7 +24,20 @@ def work(args: argparse.Namespace) -> None:
         raise UserError("a figure of several studies", key="study", value=args.study, remedy=remedy)
     check_names(Study.parse(args.study))
     study = Study.parse(built_by(args.study))
-    sys.exit(_show(study, WORK))
+    variants = _variants(study)
+    for each in variants:
+        check_names(each)
+    sys.exit(_show(study, WORK, [each.preset for each in variants]))
+
+
+def _variants(study: Study) -> list[Study]:
+    """Lists the presets and designs of a study, or the designs of a preset."""
+    above = f"{study.preset}." if study.preset else ""
+    return [
+        each
+        for each in studies()
+        if each.name == study.name and each != study and each.preset.startswith(above)
+    ]
 
 
 def show(names: Iterable[str]) -> None:
@@ -36,7 +49,8 @@ def show(names: Iterable[str]) -> None:
         _show(Study.parse(name), Path.cwd())
 
 
-def _show(study: Study, folder: Path) -> int:
+def _show(study: Study, folder: Path, variants: Sequence[str] = ()) -> int:
     command = [sys.executable, "-m", f"{PREFIX}reports", "check", *study.options.split()]
-    shown = subprocess.run([*command, "--out-dir", f"results/{study}"], cwd=folder, check=False)
+    command += ["--out-dir", f"results/{study}", *(["--variants", *variants] if variants else [])]
+    shown = subprocess.run(command, cwd=folder, check=False)
     return shown.returncode

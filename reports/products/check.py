@@ -1,6 +1,7 @@
 """Shows a problem before it is computed: a picture of it, its size, and what may not be meant."""
 
 import argparse
+import logging
 import sys
 from collections.abc import Iterator
 
@@ -21,6 +22,7 @@ from pipeline.posing import (
     scene_of,
     spread,
     unit_coordinates,
+    variant_faults,
 )
 from pipeline.problem import Problem
 from pipeline.runtime import write_atomically
@@ -31,19 +33,33 @@ from reports.panels import CLAMP_TINT, CLOAK_TINT
 from sim.scene import DOFS, Scene
 from sim.solvers import TimeSeries
 
+LOG = logging.getLogger(__name__)
+
 SIDE = 110.0
 """Of the picture, mm."""
 
 
 def report(args: argparse.Namespace) -> None:
-    """Draws ``check.png`` and says the rest, a line each; what the scene itself warns of is logged.
+    """Draws ``check.png`` and says the rest, then tells the faults of variants one by one.
 
     Raises:
-        UserError: the problem has a fault, or the file of measured constants that it names.
+        UserError: the last of the faults of the problem and of its variants.
     """
+    own = args.preset or ""
+    faults = variant_faults(args.problem, [own, *args.variants])
+    if own not in faults:
+        _show(args)
+    if faults:
+        *others, last = faults.values()
+        for fault in others:
+            LOG.error("error: %s", fault)
+        raise last
+
+
+def _show(args: argparse.Namespace) -> None:
+    """Draws a problem without faults; what its scene itself warns of is logged."""
     asked = problem.load(args.problem, args.preset)
     scene = scene_of(asked, args.problem.parent)
-    problem.check_measured_constants(asked, args.problem.parent)
     found = [*doubts(asked, scene), *_unread(asked)]
     told = [cost_line(asked, scene), *(f"warning: {line}" for line in found)]
     with style.styled():

@@ -42,7 +42,7 @@ def load(path: str | Path, preset: str | None = None) -> Problem:
     """
     document = yaml_file.read_yaml(Path(path))
     data = dict(document.data)
-    presets = data.pop("presets", None) or {}
+    presets = _presets(document, data.pop("presets", None))
     preset, number = designs.split_name(preset)
     if preset is not None:
         data = overlay_keys(data, _preset(document, presets, preset))
@@ -141,13 +141,23 @@ def preset_names(path: str | Path) -> tuple[str, ...]:
     return tuple(presets) if isinstance(presets, dict) else ()
 
 
-def _preset(document: Document, presets: object, name: str) -> dict[str, Any]:
+def _presets(document: Document, found: object) -> dict[str, Any]:
+    if found is None or isinstance(found, dict):
+        return found or {}
+    raise UserError(
+        "presets are wanted here",
+        file=document.path,
+        line=document.line(("presets",)),
+        key="presets",
+        remedy="write `NAME:` and its keys below it",
+    )
+
+
+def _preset(document: Document, presets: dict[str, Any], name: str) -> dict[str, Any]:
     def refused(what: str, key: str, remedy: str) -> UserError:
         line = document.line(("presets", name))
         return UserError(what, file=document.path, line=line, key=key, remedy=remedy)
 
-    if not isinstance(presets, dict):
-        raise refused("presets are wanted here", "presets", "write `NAME:` and its keys below it")
     if name not in presets:
         known = ", ".join(map(str, presets)) or "none"
         near = get_close_matches(name, [str(key) for key in presets], n=1)
@@ -156,7 +166,7 @@ def _preset(document: Document, presets: object, name: str) -> dict[str, Any]:
     if not isinstance(presets[name], dict):
         remedy = "write the keys that it changes below it"
         raise refused("keys and values are wanted here", f"presets.{name}", remedy)
-    return presets[name]
+    return dict(presets[name])
 
 
 def load_section(path: Path, kind: type[Alone]) -> Alone:

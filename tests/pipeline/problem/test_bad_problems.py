@@ -61,6 +61,7 @@ def test_an_unknown_preset_lists_those_there_are(fig2: Path) -> None:
 
 def test_presets_are_mappings(refusal: Refusal) -> None:
     assert refusal("\npresets:", "\npresets: 3\nrest:", "quick").key == "presets"
+    assert refusal("\npresets:", "\npresets: [quick]\nrest:").key == "presets"
     assert refusal("  edge3:\n    title", "  edge3: 3\n  x:\n    title", "edge3").line is not None
 
 

@@ -37,6 +37,23 @@ def test_a_picture_and_a_line_of_cost(tmp_path: Path, capsys: pytest.CaptureFixt
         assert min(picture.size) > 500
 
 
+@pytest.mark.parametrize(("own", "drawn"), [([], True), (["--preset", "far"], False)])
+def test_faults_of_variants_are_told_one_by_one(
+    own: list[str], drawn: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With the picture of the problem, if it has none itself."""
+    presets = "presets: { far: { drive: { amplitude: 900 mm } }, typo: { horizon: { stepz: 2 } } }"
+    path = static.write(tmp_path, static.HOLE + presets, size=5, amplitude=3.0)
+    words = ["check", "--problem", str(path), *own, "--variants", "far", "typo"]
+    assert main([*words, "--out-dir", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert told.count("error: ") == 2
+    assert told.count(f"file:   {path}") == 2
+    assert "moves its units by 900 mm" in told
+    assert "@typo: unknown key" in told
+    assert (tmp_path / "out/check.png").exists() == drawn
+
+
 def test_a_measured_motion_ends_where_the_study_does(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
