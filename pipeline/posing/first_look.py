@@ -47,6 +47,9 @@ AVOIDING = 3
 LATER = {True: (28.0, 13.0), False: (4.0, 0.7)}
 """Evaluations that a case of a sweep costs, and a load case of an imperfect copy, static or not:
 measured on Figure 4, and on Figures 2 and 7."""
+SLACK = 0.02
+"""Of the mass of solid units, by which densities of makers' data sheets may be off."""
+_GRAMS = 1e6  # in a tonne
 AFTER = 24
 """Evaluations of a motion in time that its steps, its response and their checks cost (fig7)."""
 
@@ -126,6 +129,7 @@ def doubts(asked: Problem, scene: Scene) -> Iterator[str]:
     yield from _cut_off(asked)
     yield from _shown(asked)
     yield from _picture(asked)
+    yield from _mass(asked, scene.lattice)
     yield from _necks(scene.lattice)
     if scene.lattice.n_units <= MANY:
         yield from soft_units(asked, scene.lattice, scene.lattice.vertices)
@@ -262,6 +266,29 @@ def _picture(asked: Problem) -> Iterator[str]:
         yield (
             f"{void.image.file} shows {len(drawn)} outlines, one within another or beside it: units"
             " within an odd number of them go; if the ground is dark, give `invert: true`"
+        )
+
+
+def _mass(asked: Problem, lattice: Lattice) -> Iterator[str]:
+    """Doubts a density that units moving in time cannot have as they are made."""
+    if asked.static:
+        return
+    made, density = asked.fabrication, asked.material.density
+    solid = made.solid_density * made.thickness
+    area = float(shapely.area(polygons(lattice, lattice.vertices)).sum()) * _GRAMS
+    least = 0.0 if made.print.infill is None else made.print.infill * solid
+    told = f"the units weigh {density * area:.3g} g in the simulation, but as made of"
+    told += f" {made.material}, {made.thickness:g} mm thick,"
+    matching = f"give `fabrication.thickness: {density / made.solid_density:.3g} mm`"
+    if density > (1.0 + SLACK) * solid:
+        yield (
+            f"{told} {solid * area:.3g} g even if solid; {matching} or more, another"
+            f" `fabrication.material`, or `material.density: {solid * 1e9:.3g} kg/m^2` or less"
+        )
+    elif density < (1.0 - SLACK) * least:
+        yield (
+            f"{told} {least * area:.3g} g at least with `fabrication.print.infill`"
+            f" {made.print.infill:g}; give {density / solid:.2g} there, or leave it out"
         )
 
 

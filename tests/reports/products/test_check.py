@@ -4,16 +4,18 @@ from string import Template
 
 import numpy as np
 import pytest
+import shapely
 import xarray as xr
 from PIL import Image, ImageDraw
 
-from pipeline.posing import cost_line, doubts, scene_of
+from pipeline.posing import altered_lattice_of, cost_line, doubts, scene_of
 from pipeline.problem import load
 from pipeline.problem.sections import Method, Robust
 from pipeline.runtime import ROOT
 from reports.__main__ import main
 from reports.products import check
 from sim.scene import estimate_cost, sample_times
+from sim.structure import polygons
 from tests.pipeline import static
 
 IMAGE = (
@@ -221,3 +223,35 @@ def test_a_neck_is_doubted(tmp_path: Path) -> None:
     wide += " [22 mm, 50 mm]] } }\ncloak: { disc: { radius: 29 mm } }\n"
     (told,) = doubted(static.write(tmp_path, wide + static.MIMIC, size=5, amplitude=3.0))
     assert told.startswith("necks of one unit: 1, the first at [2, 4]")
+
+
+@pytest.mark.parametrize(
+    ("drive", "more", "told"),
+    [
+        ("harmonic", "fabrication: { thickness: 4 mm }", ["4.96", "thickness: 4.98 mm"]),
+        ("harmonic", "fabrication: { material: PETG, thickness: 4.9 mm }", None),
+        ("harmonic", "fabrication: { print: { infill: 0.8 } }", ["8.04", "give 0.62 there"]),
+        ("harmonic", "", None),
+        ("linear_ramp", "fabrication: { thickness: 4 mm }", None),
+    ],
+)
+def test_a_mass_that_no_specimen_has_is_doubted(
+    drive: str, more: str, told: list[str] | None, tmp_path: Path
+) -> None:
+    """In motions in time alone: 6.18 kg/m^2 are 0.62 of 8.1 mm of PLA, of 1240 kg/m^3."""
+    path = static.write(tmp_path, static.HOLE + more, size=5, amplitude=3.0)
+    if drive == "harmonic":
+        text = path.read_text().replace("linear_ramp", "harmonic").replace(", steps: 4", "")
+        text = text.replace("samples: 9", "samples: 99")
+        path.write_text(text.replace("  duration: 1 s", "  frequency: 1 Hz"))
+    found = [line for line in doubted(path) if "the units weigh" in line]
+    assert len(found) == (told is not None)
+    if told:
+        per_area, remedy = told
+        asked = load(path)
+        area = float(
+            shapely.area(polygons(lattice := altered_lattice_of(asked), lattice.vertices)).sum()
+        )
+        assert f"weigh {6.18e-3 * area:.3g} g" in found[0]
+        assert f"{float(per_area) * 1e-3 * area:.3g} g" in found[0]
+        assert remedy in found[0]
