@@ -160,8 +160,8 @@ def minimise_worst(
         start: (n_variables,) design vector, mm; by default the initial structure.
         sqp: of the descents; its evaluations are those of all of them, without the searches.
         options: of the minimisation.
-        journal: of evaluations and searches, from which an interrupted run resumes exactly. Its key
-            is to name all that the losses depend on.
+        journal: of evaluations, searches and constraints under loads, from which an interrupted run
+            resumes exactly. Its key is to name all that they depend on.
         callback: called with each evaluation of the set as it is recorded.
 
     Raises:
@@ -172,7 +172,7 @@ def minimise_worst(
     held = LoadSet(losses, scene, options)
     wrap: Callable[[Evaluate], Evaluate] = (lambda f: f) if journal is None else journal.wrap
     search, evaluate = LoadSearch(losses, wrap, options.search), wrap(held)
-    constraints = constraints_of(scene, make_plan(scene), limits)
+    constraints = constraints_of(scene, make_plan(scene), limits, journal)
     x = np.zeros(scene.space.n_variables) if start is None else start
     history: list[Evaluation] = []
     best: tuple[float, bool, Result] | None = None

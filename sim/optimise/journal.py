@@ -11,12 +11,13 @@ from __future__ import annotations
 import fcntl
 import json
 import logging
+import math
 import os
 import struct
 import zlib
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO
+from typing import BinaryIO, Protocol
 
 import numpy as np
 
@@ -29,6 +30,12 @@ _HEADER = struct.Struct("<4sQI")
 _MAGIC = b"EVAL"
 
 
+class Stateful(Protocol):
+    """Holds what its evaluations leave for those that follow, as numbers (n,)."""
+
+    state: Floats
+
+
 class JournalInUseError(RuntimeError):
     """Another process is writing to the journal."""
 
@@ -37,7 +44,7 @@ class Journal:
     """Append-only file of evaluations; use it as a context manager.
 
     Each record is a header (magic, length, CRC-32 of the payload) and a payload: a line of JSON
-    with the shapes, then design, loss, gradient and further numbers as little-endian doubles. A
+    with the shapes, then design, loss, gradient, more numbers and state as little-endian doubles. A
     damaged or incomplete tail is cut off at the last good record. A design that differs from the
     recorded one in any bit means that the code or the machine has changed since: the rest of the
     journal is then of no use, it is cut off with a warning, and the run continues by computing.
@@ -95,19 +102,24 @@ class Journal:
             what = "evaluations of another problem or program"
             log.warning("%s: %d %s, kept as %s; starting anew", self.path, dropped, what, kept.name)
 
-    def wrap(self, evaluate: Evaluate) -> Evaluate:
-        """Gives ``evaluate`` a memory: reads its results back while the journal holds them."""
+    def wrap(self, evaluate: Evaluate, holder: Stateful | None = None) -> Evaluate:
+        """Gives ``evaluate`` a memory: reads its results back while the journal holds them.
+
+        With them comes back the state in which the evaluation, or its failure, left ``holder``.
+        """
 
         def remembered(x: Floats) -> tuple[float, Floats, Floats]:
             start = self._open.tell()
             payload = self._read()
             if payload is not None and _design(payload) == x.tobytes():
                 self.replayed += 1
+                if holder is not None:
+                    holder.state = _state(payload)
                 return _outcome(payload)
             if payload is not None:
                 log.warning("%s: evaluation %d differs, continuing anew", self.path, self.replayed)
                 self._cut(start)
-            return self._compute(evaluate, x)
+            return self._compute(evaluate, x, holder)
 
         return remembered
 
@@ -117,14 +129,19 @@ class Journal:
             raise RuntimeError("the journal is not open: use it in a with statement")
         return self._file
 
-    def _compute(self, evaluate: Evaluate, x: Floats) -> tuple[float, Floats, Floats]:
+    def _compute(
+        self, evaluate: Evaluate, x: Floats, holder: Stateful | None
+    ) -> tuple[float, Floats, Floats]:
+        outcome, failure = (float("nan"), np.zeros(0), np.zeros(0)), None
         try:
             loss, gradient, aux = evaluate(x)
-        except SimulationError as failure:
-            self._write(_encode(x, np.nan, np.zeros(0), np.zeros(0), failure))
-            raise
-        outcome = float(loss), np.array(gradient, dtype="<f8"), np.array(aux, dtype="<f8")
-        self._write(_encode(x, *outcome, None))
+            outcome = float(loss), np.array(gradient, dtype="<f8"), np.array(aux, dtype="<f8")
+        except SimulationError as error:
+            failure = error
+        state = np.zeros(0) if holder is None else holder.state
+        self._write(_encode(x, *outcome, state, failure))
+        if failure is not None:
+            raise failure
         return outcome
 
     def _read(self) -> bytes | None:
@@ -157,17 +174,23 @@ class Journal:
 
 
 def _encode(
-    x: Floats, loss: float, gradient: Floats, aux: Floats, failure: SimulationError | None
+    x: Floats,
+    loss: float,
+    gradient: Floats,
+    aux: Floats,
+    state: Floats,
+    failure: SimulationError | None,
 ) -> bytes:
     shapes: dict[str, object] = {
         "design": len(x),
         "gradient": len(gradient),
         "aux": list(aux.shape),
+        "state": len(state),
         "failure": None if failure is None else str(failure),
     }
     if failure is not None:
         shapes |= {"step": _whole(failure.step), "unit": _whole(failure.unit)}
-    numbers = np.concatenate([x, [loss], gradient, aux.ravel()]).astype("<f8")
+    numbers = np.concatenate([x, [loss], gradient, aux.ravel(), state]).astype("<f8")
     return json.dumps(shapes).encode() + b"\n" + numbers.tobytes()
 
 
@@ -185,9 +208,15 @@ def _design(payload: bytes) -> bytes:
     return numbers[: shapes["design"]].tobytes()
 
 
+def _state(payload: bytes) -> Floats:
+    shapes, numbers = _decode(payload)
+    return numbers[len(numbers) - shapes["state"] :].copy()
+
+
 def _outcome(payload: bytes) -> tuple[float, Floats, Floats]:
     shapes, numbers = _decode(payload)
     if shapes["failure"] is not None:
         raise SimulationError(shapes["failure"], shapes.get("step"), shapes.get("unit"))
-    _, loss, gradient, aux = np.split(numbers, np.cumsum([shapes["design"], 1, shapes["gradient"]]))
+    counts = [shapes["design"], 1, shapes["gradient"], math.prod(shapes["aux"])]
+    _, loss, gradient, aux, _ = np.split(numbers, np.cumsum(counts))
     return float(loss[0]), gradient.copy(), aux.reshape(shapes["aux"]).copy()

@@ -240,8 +240,8 @@ def minimise(
         options: of the method, which they choose; by default SQP with its own.
         plan: of `make_plan`; by default one from the initial structure.
         journal: of evaluations, from which an interrupted run resumes exactly. It tells scenes
-            apart by its key alone, which is to name all that the loss depends on. Constraints
-            under loads, of a snap margin or foil, are not in it and are computed again.
+            apart by its key alone, which is to name all that the loss depends on. It holds
+            constraints under loads as well, of a snap margin or foil.
         paths: of equilibria, that evaluations of a static scene start from.
         callback: called with each evaluation as it is recorded.
 
@@ -251,7 +251,8 @@ def minimise(
         UnconfirmedError: no design is confirmed by a path through more loads.
     """
     made = plan or make_plan(scene)
-    computed, constraints = Evaluator(scene, made, paths), constraints_of(scene, made, limits)
+    computed = Evaluator(scene, made, paths)
+    constraints = constraints_of(scene, made, limits, journal)
     begin = np.zeros(scene.space.n_variables) if start is None else start
     if isinstance(constraints, PathConstraints):
         begin = constraints.drawn_back(begin)
@@ -305,11 +306,13 @@ def _check_steps(evaluate: Evaluator, result: Result) -> None:
             )
 
 
-def constraints_of(scene: Scene, plan: Plan, limits: Limits) -> ConstraintVector | PathConstraints:
-    """Lists what a design must keep to."""
+def constraints_of(
+    scene: Scene, plan: Plan, limits: Limits, journal: Journal | None = None
+) -> ConstraintVector | PathConstraints:
+    """Lists what a design must keep to; a journal remembers what that takes to solve."""
     geometry, asked = ConstraintVector(scene.space, limits), scene.objective
     at_rest = asked.snap_margin is None and asked.foil is None
-    return geometry if at_rest else PathConstraints(scene, plan, geometry)
+    return geometry if at_rest else PathConstraints(scene, plan, geometry, journal)
 
 
 def _from_rest(scene: Scene, plan: Plan) -> Evaluator | None:

@@ -13,7 +13,7 @@ from jax import Array
 from sim.constraints import ConstraintVector
 from sim.core import Floats, Ints, SimulationError
 from sim.energy import ligament_strain, system_of
-from sim.optimise import feasible_design
+from sim.optimise import Journal, feasible_design
 from sim.quasistatics import (
     StaticRecord,
     StaticSolver,
@@ -69,14 +69,21 @@ class PathConstraints:
     ``scene.objective.foil`` there is one value for each case: 1 - strain / limit of the largest
     strain of all ligaments and times, a p-norm in the place of the maximum.
 
-    A structure that cannot be made is not loaded: its values are infinite.
+    A structure that cannot be made is not loaded: its values are infinite. Values under loads are
+    read back from a ``journal``, with their slopes, while it holds them.
 
     Raises:
         ValueError: a scene with a snap margin is not static.
         SimulationError: the initial structure is not stable at rest.
     """
 
-    def __init__(self, scene: Scene, plan: Plan, geometry: ConstraintVector) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        plan: Plan,
+        geometry: ConstraintVector,
+        journal: Journal | None = None,
+    ) -> None:
         share, solver = scene.objective.snap_margin, plan.solver
         self.geometry, self._solver, self._foil = geometry, solver, scene.objective.foil
         self._path = solver
@@ -98,6 +105,7 @@ class PathConstraints:
             self.bound = share * lowest_eigenpair(system, np.zeros(scene.topology.n_dofs))[0]
         if self._foil is not None:
             self._strain = _strain_and_slopes(scene, self._foil)
+        self._evaluate = self._solve if journal is None else journal.wrap(self._solve, self)
 
     def __call__(self, design: Floats) -> tuple[Floats, sp.csr_array]:
         """Evaluates the constraints (n_constraints,) and their Jacobian at a design vector, mm.
@@ -145,13 +153,28 @@ class PathConstraints:
     def _n_strain(self) -> int:
         return 0 if self._foil is None else len(self._cases)
 
+    @property
+    def state(self) -> Floats:
+        """Lists the ways that are watched after a snap: case, load, evaluations left of each."""
+        return np.array([(*way, left) for way, left in self._watched.items()], float).ravel()
+
+    @state.setter
+    def state(self, watched: Floats) -> None:
+        rows = watched.astype(int).reshape(-1, 3).tolist()
+        self._watched = {(case, load): left for case, load, left in rows}
+
     def _under_load(self, design: Floats) -> tuple[Floats, Floats]:
         """Values (n,) of all loads in mm, and their derivatives (n, n_variables)."""
+        _, values, slopes = self._evaluate(design)
+        return values, slopes
+
+    def _solve(self, design: Floats) -> tuple[float, Floats, Floats]:
+        """Values and derivatives in the form of an evaluation, whose loss is zero."""
         values = concrete(self._of_design(design))
         motion, _, records = solve_cases(self._path, values, self._cases)
         every = [*self._snaps(values, records), *self._strains(values, motion, records)]
         rows = [self._of_design.pull_back(design, Parameters(*bar)) for _, bar in every]
-        return np.array([value for value, _ in every]), np.stack(rows)
+        return 0.0, np.array([value for value, _ in every]), np.stack(rows)
 
     def _snaps(self, values: ConcreteParameters, records: Records) -> Iterator[Slope]:
         if self.bound is None:

@@ -1,5 +1,7 @@
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from unittest.mock import Mock
 
 import jax.numpy as jnp
 import numpy as np
@@ -8,9 +10,10 @@ import pytest
 import sim
 from sim.constraints import ConstraintVector
 from sim.core import Floats
-from sim.optimise import Result
-from sim.scene import PathConstraints, foil_strains
+from sim.optimise import Journal, Result
+from sim.scene import PathConstraints, foil_strains, path_constraints
 from sim.scene.evaluation import _from_rest
+from sim.solvers import solve_cases
 from sim.structure import Copies, FoilLimit
 from tests.sim.structures import central, pressed, taylor_orders
 from tests.tables import some
@@ -94,6 +97,30 @@ def test_a_snap_is_a_value_that_leads_out_of_it() -> None:
     assert constraint(led)[0].min() >= 0.0
     assert not sim.simulate(posed, led).records[0].jumped.any()
     assert np.abs(led - snapping).max() < 0.5
+
+
+@pytest.mark.parametrize("kept", [1.0, 0.6, 0.3])
+def test_a_journal_remembers_constraints_under_loads(
+    kept: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With what they watch after a snap: a resumed run designs the same bits, and solves less."""
+    posed, snapping = scene(0.2, FOIL._replace(strain=0.5)), best_design(None).x
+    path, options = tmp_path / "sqp.journal", sim.SqpOptions(evaluations=4, retreats=0)
+
+    def designed() -> tuple[bytes, int]:
+        spied.reset_mock()
+        with Journal(path, "key") as journal:
+            found = sim.minimise(posed, LIMITS, snapping, options=options, journal=journal)
+        return found.x.tobytes(), spied.call_count
+
+    spied = Mock(wraps=solve_cases)
+    monkeypatch.setattr(path_constraints, "solve_cases", spied)
+    first, count = designed()
+    path.write_bytes((data := path.read_bytes())[: int(kept * len(data))])
+    again, rest = designed()
+    assert again == first
+    assert rest == 0 if kept == 1.0 else 0 < rest < count
+    assert path.read_bytes() == data
 
 
 def test_a_design_that_snaps_is_not_confirmed() -> None:
