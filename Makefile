@@ -6,7 +6,9 @@ MAKEFLAGS += --no-builtin-rules
 unexport PYTHONPATH PYTHONHOME
 PYTHON ?= python3
 BIN := .venv/bin
-STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml experiments/*/figure.yaml))))
+# Without names of several words to make, or with signs of its own: the workflow refuses those.
+STUDIES := $(shell cd experiments 2>/dev/null && for file in */problem.yaml */figure.yaml; do name="$${file%/*}"; \
+    [ ! -e "$$file" ] || [[ "$$name" == *[[:space:][:punct:]]* && ! "$$name" =~ ^[[:alnum:]_@.-]+$$ ]] || echo "$$name"; done)
 PAGES := all fig1 index movies calibrate validation benchmark any_load
 PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains certificate front,$(addsuffix _$(product),$(STUDIES)))
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder

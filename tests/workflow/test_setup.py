@@ -341,3 +341,22 @@ def test_a_preset_without_a_name_is_no_target(pretended: Path) -> None:
 @cases("workflow", "listed, settings")
 def test_settings_of_pip_become_those_of_uv(listed: str, settings: dict[str, str]) -> None:
     assert uv_settings(listed) == settings
+
+
+@pytest.mark.parametrize("name", ["copy of mine", "a:b", "a%b", "a#b", "a=b", "a(b", "a'b", "a$b"])
+def test_a_folder_that_is_no_study_leaves_make_alone(name: str, tmp_path: Path) -> None:
+    """In a checkout whose own path has a space."""
+    place = checkout(tmp_path / "my folder")
+    for study in ("mine", "of_units", name):
+        (place / "experiments" / study).mkdir(parents=True)
+        (place / "experiments" / study / "problem.yaml").touch()
+    told = subprocess.run(
+        ["make", "help"],
+        cwd=place,
+        env=own_environment(),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "(studies here: mine of_units)" in told.stdout
+    assert told.stderr == ""
