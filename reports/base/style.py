@@ -6,6 +6,9 @@ that it will have in print. Colour maps are straight in lightness and even in OK
 """
 
 import io
+import logging
+import re
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,10 +20,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, ListedColormap, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.font_manager import fontManager
 from matplotlib.text import Annotation
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sim.core import Floats
+
+LOG = logging.getLogger(__name__)
 
 TWO_COLUMNS = 178.0
 """Width of a journal's two columns, mm."""
@@ -36,6 +42,16 @@ RC = mpl.rc_params_from_file(Path(__file__).with_name("paper.mplstyle"), use_def
 TEXT, SMALL, TITLE = RC["font.size"], RC["legend.fontsize"], RC["axes.titlesize"]
 PANEL = 9.0
 """Font sizes in points: labels, ticks and notes, titles, panel letters."""
+
+FALLBACKS = (
+    "Noto Sans CJK SC", "Noto Sans CJK JP", "Noto Sans SC", "Source Han Sans SC",
+    "Source Han Sans CN", "WenQuanYi Micro Hei", "WenQuanYi Zen Hei", "Microsoft YaHei", "SimHei",
+    "PingFang SC", "PingFang HK", "Hiragino Sans GB", "Heiti TC", "STHeiti", "Hiragino Sans",
+    "Yu Gothic", "Malgun Gothic", "Apple SD Gothic Neo", "Arial Unicode MS", "Droid Sans Fallback",
+    "Unifont",
+)  # fmt: skip
+"""Fonts of Linux, Windows and macOS with Chinese, Japanese or Korean characters."""
+_NO_GLYPH = re.compile(r"Glyph (\d+) .*missing from font")
 
 _METADATA: dict[str, dict[str, str | None]] = {
     "pdf": {"Creator": "metacloak", "Producer": None, "CreationDate": None},
@@ -108,11 +124,37 @@ SIGNED = two_sided("signed", ["#efefee", "#5b9fce", "#0d3b70"], ["#efefee", "#d9
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Matplotlib's settings of this style, on top of its defaults, whatever the user's own are."""
-    with mpl.rc_context():
+    """Matplotlib's settings of this style, on top of its defaults, whatever the user's own are.
+
+    What the style's font lacks is taken from the first font here that has it.
+    """
+    with mpl.rc_context(), _missing_glyphs():
         mpl.rcdefaults()
         mpl.rcParams.update(RC)
+        here = set(fontManager.get_font_names())
+        mpl.rcParams["font.family"] += [name for name in FALLBACKS if name in here]
         yield
+
+
+@contextmanager
+def _missing_glyphs() -> Iterator[None]:
+    """Warns once of characters that no font has, in the place of a warning for each."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.filterwarnings("always", _NO_GLYPH.pattern)
+        yield
+    missing: dict[str, None] = {}
+    for each in caught:
+        if found := _NO_GLYPH.match(str(each.message)):
+            missing[chr(int(found[1]))] = None
+        else:
+            warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
+    if missing:
+        LOG.warning(
+            "no font here has %s: boxes stand for them in pictures; install a font that has them,"
+            " such as Noto Sans CJK (Debian: fonts-noto-cjk), then remove %s",
+            "".join(missing),
+            f"{mpl.get_cachedir()}/fontlist-*.json",
+        )
 
 
 def page(height: float, width: float = TWO_COLUMNS) -> Figure:

@@ -1,3 +1,4 @@
+import warnings
 from pathlib import Path
 
 import matplotlib as mpl
@@ -90,3 +91,40 @@ def test_saved_files_have_the_same_bytes(tmp_path: Path) -> None:
         return [path.read_bytes() for path in paths]
 
     assert saved("first") == saved("second")
+
+
+def drawn(title: str, folder: Path) -> list[bytes]:
+    """A figure with a title, in each format."""
+    with style.styled():
+        figure = style.page(30.0, 60.0)
+        style.place(figure, 20.0, 10.0, 30.0, 15.0).set_title(title)
+        return [path.read_bytes() for path in style.save(figure, folder / "figure")]
+
+
+def test_characters_that_no_font_has_are_told_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(style, "FALLBACKS", ("No such font",))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        drawn("心形 heart 心", tmp_path)
+    (record,) = caplog.records
+    assert "no font here has 心形: boxes stand for them" in record.getMessage()
+
+
+def test_other_warnings_are_passed_on() -> None:
+    with pytest.warns(UserWarning, match="something else"), style.styled():
+        warnings.warn("something else", stacklevel=1)
+
+
+def test_a_font_stands_in_where_the_own_lacks_a_character(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """And nowhere else: figures without such characters have the same bytes."""
+    found = []
+    for fonts in ((), ("STIXGeneral",)):
+        monkeypatch.setattr(style, "FALLBACKS", fonts)
+        found.append(drawn(r"A heart é, $\alpha$", tmp_path))
+    assert found[0] == found[1]
+    drawn("\u20dd", tmp_path)
+    assert caplog.records == []
