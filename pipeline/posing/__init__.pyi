@@ -18,6 +18,7 @@ from .first_look import compliance_shares as compliance_shares
 from .first_look import cost_line as cost_line
 from .first_look import doubts as doubts
 from .first_look import soft_units as soft_units
+from .first_look import variant_faults as variant_faults
 from .perturbed import drawn as drawn
 from .response_dataset import assemble_response as assemble_response
 from .response_dataset import case_directions as case_directions
@@ -51,7 +52,6 @@ from .to_scene import limits_of as limits_of
 from .to_scene import material_of as material_of
 from .to_scene import scene_of as scene_of
 from .to_scene import stiffness_factors as stiffness_factors
-from .variants import variant_faults as variant_faults
 from .verification import AS_RUN as AS_RUN
 from .verification import CheckResult as CheckResult
 from .verification import assemble_verification as assemble_verification

@@ -1,7 +1,10 @@
-"""Looks at a problem before it is computed: what it costs, and what may not be meant."""
+"""Looks at a problem before it is computed: cost, faults of presets, what may not be meant."""
 
+import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import shapely
@@ -9,7 +12,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import pdist, squareform
 
+from pipeline import problem
 from pipeline.posing.perturbed import noises
+from pipeline.posing.robust_scene import design_scene, load_family
 from pipeline.posing.to_scene import material_of
 from pipeline.problem import Problem
 from pipeline.problem.sections import (
@@ -18,6 +23,7 @@ from pipeline.problem.sections import (
     case_count,
     single_drives,
 )
+from pipeline.runtime import UserError
 from sim.core import Floats, Ints
 from sim.scene import Scene, estimate_cost, sample_times
 from sim.structure import Lattice, Material, polygons
@@ -50,8 +56,61 @@ measured on Figure 4, and on Figures 2 and 7."""
 SLACK = 0.02
 """Of the mass of solid units, by which densities of makers' data sheets may be off."""
 _GRAMS = 1e6  # in a tonne
+_NAMED = 3  # variants with the same fault that are named
 AFTER = 24
 """Evaluations of a motion in time that its steps, its response and their checks cost (fig7)."""
+
+
+def variant_faults(source: Path, variants: Sequence[str]) -> dict[str, UserError]:
+    """Finds the faults of variants of a problem, each once, by the first variant that has it.
+
+    Nothing is solved. The faults of the first variant are told as they are, those of others alone
+    with the names of these.
+
+    Args:
+        source: the problem file.
+        variants: presets, designs, or designs of presets: "quick", "2", "quick.2"; "" for the
+            problem itself.
+    """
+    found: dict[str, tuple[UserError, list[str]]] = {}
+    with _without_warnings():
+        for variant in variants:
+            if (fault := _fault(source, variant)) is not None:
+                found.setdefault(str(fault), (fault, []))[1].append(variant)
+    for fault, sharing in found.values():
+        if sharing[0] != variants[0]:
+            fault.what = f"{_listed(source.parent.name, sharing)}: {fault.what}"
+    return {sharing[0]: fault for fault, sharing in found.values()}
+
+
+def _fault(source: Path, variant: str) -> UserError | None:
+    try:
+        asked = problem.load(source, variant or None)
+        design_scene(asked, source.parent)
+        load_family(asked, source.parent)
+        problem.check_measured_constants(asked, source.parent)
+    except UserError as error:
+        error.file = error.file or str(source)
+        return error
+    return None
+
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """Silences warnings of scenes: they do not say which variant they are about."""
+    logging.disable(logging.WARNING)
+    try:
+        yield
+    finally:
+        logging.disable(logging.NOTSET)
+
+
+def _listed(study: str, variants: Sequence[str]) -> str:
+    """Names variants, without the designs of a preset that is one of them."""
+    sharing = [each for each in variants if each.rpartition(".")[0] not in variants]
+    named = ", ".join(f"{study}@{each}" for each in sharing[:_NAMED])
+    others = len(sharing) - _NAMED
+    return f"{named} and {others} more" if others > 0 else named
 
 
 def cost_line(asked: Problem, scene: Scene) -> str:

@@ -46,5 +46,6 @@ def test_a_fault_of_several_is_told_once(source: Path) -> None:
     source.write_text(source.read_text().replace("law: angle", "law: anglle"))
     (found,) = variant_faults(source, ["", "quick", "1", "2"]).values()
     assert found.what == "not one of the choices"
-    _, found = variant_faults(source, ["typo", "1", "2", "quick", "quick.1"]).values()
-    assert found.what == "mine@1, mine@2, mine@quick and 1 more: not one of the choices"
+    every = ["typo", "1", "2", "far", "quick", "quick.1", "quick.2"]
+    _, found = variant_faults(source, every).values()
+    assert found.what == "mine@1, mine@2, mine@far and 1 more: not one of the choices"
