@@ -1,7 +1,6 @@
 """Tracks units from frame to frame: predicted, fitted, judged, and relocalised."""
 
 import logging
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -10,23 +9,16 @@ from pipeline.runtime import Picture
 from pipeline.tracking.detect import LatticePlace, Relocaliser
 from pipeline.tracking.fit import ExposureBlur, PoseFits, PoseFitter, SideWalls
 from pipeline.tracking.geometry import SpecimenOutlines
-from pipeline.tracking.motion.exposure_meter import ExposureMeter
 from pipeline.tracking.motion.light_slopes import LightSlopes
-from pipeline.tracking.motion.prediction import Neighbourhood, latest_velocity
-from pipeline.tracking.motion.unit_looks import SHARE, SHARE_KNOWN, UnitLooks, white_share
+from pipeline.tracking.motion.prediction import latest_velocity
+from pipeline.tracking.motion.unit_looks import SHARE, UnitLooks, white_share
+from pipeline.tracking.motion.unit_search import Shutter, UnitSearch, UnitStates, gain_change
 from sim.core import Floats, Ints, Mask, Reals
 
 LOG = logging.getLogger(__name__)
 
-_QUICK = 2.0
-"""Motion from frame to frame that may blur a unit where the exposure is not known, px."""
 _PAST = 3
 """Frames before one that tell of its velocities."""
-_STRAY = 0.25
-"""A unit so far from where its neighbours carry it is another one, or none, pitches."""
-_TURNED = 0.5
-"""Or so far turned from there, rad."""
-_TIGHT = 6.0
 _FEW, _HALF = 0.9, 0.5
 """Part of the units below which the specimen may have jumped; with as many found in another place,
 it has."""
@@ -39,21 +31,8 @@ _OTHER_TURN = np.deg2rad(20.0)
 """Between turns at which a lattice may look alike."""
 _MOST_TURN = np.deg2rad(45.0)
 """Within a frame of a specimen in sight: half of the turn that leaves squares as they were."""
-_CLOSE = 0.5
-"""Two units nearer to each other than this part of their least distance at rest are one."""
 _FACE = 0.5
 """Part of a unit's reach within which it shows its face alone."""
-_ROUNDS = 40
-_RETRIES = 4
-
-
-class Shutter(NamedTuple):
-    """Holds the shutter of a camera."""
-
-    exposure: float | None = None  # of a row, s; without it, the first quick motions tell
-    readout: float = 0.0  # from the first row to the last, s; negative where these are upside down
-    noise: float = 0.0  # residuals to expect of the sensor's noise, levels
-
 
 _GLOBAL = Shutter()
 
@@ -76,6 +55,12 @@ class _Trial(NamedTuple):
 
 def _otherwise_turned(one: LatticePlace, other: LatticePlace) -> bool:
     return bool(np.abs(np.angle(np.exp(1j * (one.turn - other.turn)))) > _OTHER_TURN)
+
+
+def _turn_between(pose: Floats, other: Floats) -> float:
+    """Returns the angle between a lattice in some poses (units, 3) and in others, rad."""
+    turns = np.exp(1j * (pose - other)[:, 2])
+    return float(np.abs(np.angle(turns.mean())))
 
 
 class Tracker:
@@ -106,45 +91,43 @@ class Tracker:
         slopes: LightSlopes | None = None,
         seen: Mask | None = None,
     ) -> None:
-        self._fitter, self._relocaliser, self._walls = fitter, relocaliser, walls
-        self._shutter, self._blur, self._slopes = shutter, blur, slopes
-        self.exposure = ExposureMeter(shutter.exposure, fitter.templates.noise, blur is not None)
+        self._search = UnitSearch(specimen, fitter, relocaliser, walls, shutter, blur)
+        self.exposure = self._search.exposure
+        self._fitter, self._relocaliser = fitter, relocaliser
+        self._shutter, self._slopes = shutter, slopes
+        self._in_motion = bool(shutter.readout) or blur is not None
         self._past: list[tuple[float, Floats]] = []
-        self._out_of_sight = False
-        self._time, self._interval = 0.0, 0.0
+        self._out_of_sight, self._time = False, 0.0
         self._seen = np.ones(specimen.count, bool) if seen is None else seen
-        self._looks: UnitLooks | None = None
-        self._stray = _STRAY * specimen.pitch
-        self._neighbours = Neighbourhood(specimen.centre)
         self._centre = specimen.centre
-        middle = specimen.centre.mean(axis=0)
-        self._pixel = 1 / float(fitter.camera.px_per_mm(middle))
-        self._pose, self._photometry = fitter.start(1.0)
-        self._whole = self._pose
-        self._velocity = np.zeros_like(self._pose)
-        self._usual = np.zeros(specimen.count)
+        pose, photometry = fitter.start(1.0)
+        self._known = UnitStates(pose, np.zeros_like(pose), photometry, np.zeros(specimen.count))
+        self._whole = pose
 
     def step(self, image: Picture, time: float) -> TrackedFrame:
         """Finds the units in the next frame, at a time in s."""
-        first = self._looks is None
-        self._interval, self._time = 0.0 if first else time - self._time, time
-        fits = self._fit(image, self._predicted(), self._photometry)
-        if not first and (self._shutter.readout or self._blur is not None):
-            self._improve_velocity(fits.pose)
+        first = self._search.looks is None
+        interval, self._time = 0.0 if first else time - self._time, time
+        known = self._known = self._known._replace(interval=interval)
+        fits = self._search.fit(image, known, self._search.predicted(known), known.photometry)
+        if not first and self._in_motion:
+            known = self._known = self._with_velocity(fits.pose)
             if self.exposure.open:
                 self._measure_exposure(image, fits)
             if self._shutter.readout or self.exposure.time:
-                fits = self._fit(image, fits.pose, fits.photometry)
+                fits = self._search.fit(image, known, fits.pose, fits.photometry)
         if first:
-            self._looks = UnitLooks(fits, self._fitter.templates, self._shutter.noise, self._seen)
+            templates, noise = self._fitter.templates, self._shutter.noise
+            self._search.looks = UnitLooks(fits, templates, noise, self._seen)
             self._fitter.full = np.nan_to_num(fits.information)
-        good = self._complete(image, fits, self._accepted(fits, SHARE))
+        good = self._search.complete(image, known, fits, self._search.accepted(fits, known))
         jumped = good.mean() < _FEW
         if jumped and not first:
             fits, good = self._relocalise(image, fits, good)
-        if self._out_of_sight and good.sum() <= _HALF * self._relocaliser.in_view(self._pose).sum():
+        in_view = self._relocaliser.in_view(self._known.pose)
+        if self._out_of_sight and good.sum() <= _HALF * in_view.sum():
             good[:] = False  # a few may be others, a unit aside
-        good &= ~self._neighbours.collisions(fits.pose, good, _CLOSE)
+        good &= ~self._search.collisions(fits, good)
         quality = self._reasons(image, fits, good)
         if self._slopes is not None and not first:
             self._slopes.apply(fits, good)
@@ -153,93 +136,50 @@ class Tracker:
         self._update(fits, good, first or jumped)
         return TrackedFrame(fits, quality)
 
-    def _fit(
-        self,
-        image: Picture,
-        pose: Floats,
-        photometry: Floats,
-        chosen: Mask | None = None,
-        tight: Floats | None = None,
-    ) -> PoseFits:
-        """Fits units as they move while the frame is exposed and read out."""
-        rows = self._fitter.camera.size[1]
-        drift = self._velocity * (self._shutter.readout / rows) if self._shutter.readout else None
-        if self._blur is not None:
-            way = self._velocity * self.exposure.time
-            cos, sin = np.cos(self._pose[:, 2]), np.sin(self._pose[:, 2])
-            x, y = way[:, 0], way[:, 1]
-            own = np.stack([cos * x + sin * y, cos * y - sin * x, way[:, 2]], axis=1)
-            self._blur.redraw(own, chosen)
-        usual = self._usual if chosen is None else None
-        return self._fitter.fit(image, pose, photometry, chosen, tight, usual, drift)
-
     @property
     def bend_share(self) -> Reals:
         """Shares (units, 2) of accelerations that the blurred frame shows, as `ExposureBlur`."""
-        whole = np.ones((len(self._pose), 2), np.float16)
-        return whole if self._blur is None else self._blur.share.copy()
+        return self._search.bend_share
 
     def _measure_exposure(self, image: Picture, fits: PoseFits) -> None:
-        way = np.linalg.norm(self._velocity[:, :2], axis=1) * self._interval
-        there = self._accepted(fits, SHARE, sharp=False)
+        known = self._known
+        way = np.linalg.norm(known.velocity[:, :2], axis=1) * known.interval
+        there = self._search.accepted(fits, known, sharp=False)
         there &= np.isfinite([pose[:, 0] for _, pose in self._past]).all(axis=0)
         if len(self._past) < 2:
             return
 
         def left(chosen: Mask) -> Floats:
             """Residuals of units fitted again, in gains of the frame before."""
-            again = self._fit(image, fits.pose, fits.photometry, chosen)
-            return (again.noise / self._photometry[:, 0])[chosen]
+            again = self._search.fit(image, known, fits.pose, fits.photometry, chosen)
+            return (again.noise / known.photometry[:, 0])[chosen]
 
-        self.exposure.measure(self._time, self._interval, way, self._pixel, there, left)
+        pixel = self._search.pixel
+        self.exposure.measure(self._time, known.interval, way, pixel, there, left)
 
-    def _improve_velocity(self, pose: Floats) -> None:
+    def _with_velocity(self, pose: Floats) -> UnitStates:
         """Takes the velocities at this frame from the poses of it and of those before."""
         now = latest_velocity([*self._past, (self._time, pose)])
-        self._velocity = np.where(np.isfinite(now), now, self._velocity)
-
-    def _predicted(self) -> Floats:
-        """Extrapolates the poses by their velocities, and redraws the walls there."""
-        ahead = self._pose + self._velocity * self._interval
-        if self._walls is not None:
-            self._walls.redraw(ahead)
-        return ahead
-
-    @property
-    def _known(self) -> UnitLooks:
-        assert self._looks is not None, "the first frame is the reference"
-        return self._looks
-
-    def _accepted(self, fits: PoseFits, share: float, sharp: bool = True) -> Mask:
-        """Judges fits; one that its motion may have blurred needs to be seen whole."""
-        quick = None
-        if sharp and not self.exposure.time and self._interval > 0:
-            quick = np.linalg.norm((fits.pose - self._pose)[:, :2], axis=1) > _QUICK * self._pixel
-        return self._known.accepted(fits, self._photometry, share, quick)
+        return self._known._replace(velocity=np.where(np.isfinite(now), now, self._known.velocity))
 
     def _reasons(self, image: Picture, fits: PoseFits, good: Mask) -> Ints:
         """Says why units are missing, by what the frame shows where they were last."""
-        lost, white = np.flatnonzero(~good), np.zeros(len(good))
-        middle = self._fitter.camera.project(self._centre[lost] + self._pose[lost, :2])
-        reach = _FACE * self._fitter.templates.reach[lost] / self._pixel
+        assert self._search.looks is not None, "the first frame is the reference"
+        pose, lost, white = self._known.pose, np.flatnonzero(~good), np.zeros(len(good))
+        middle = self._fitter.camera.project(self._centre[lost] + pose[lost, :2])
+        reach = _FACE * self._fitter.templates.reach[lost] / self._search.pixel
         white[lost] = white_share(image, middle, reach)
-        return self._known.reasons(fits, good, self._relocaliser.in_view(self._pose), white)
-
-    def _complete(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
-        """Looks for what is missing, where the good ones say."""
-        if not good.any():
-            return good
-        return self._retry_hidden(image, fits, self._propagate(image, fits, good))
+        return self._search.looks.reasons(fits, good, self._relocaliser.in_view(pose), white)
 
     def _relocalise(self, image: Picture, fits: PoseFits, good: Mask) -> tuple[PoseFits, Mask]:
         """Tries all units anew where the lattice is found; keeps what is more."""
         now = np.where(good[:, None], fits.pose, np.nan)
         places = self._relocaliser.placed_again(image, self._whole, now)
         if not self._out_of_sight:  # from one frame to the next it turns by less than to look alike
-            places = [place for place in places if self._turned_since(place) < _MOST_TURN]
+            before = self._known.pose
+            places = [place for place in places if _turn_between(place.pose, before) < _MOST_TURN]
         if not places:
             return fits, good
-        before = self._pose
         most = self._relocaliser.in_view(places[0].pose).mean() > _WHOLE
         for own in _OWN_TURNS if most else _OWN_TURNS[:1]:
             tried = self._tried(image, fits, places, own)
@@ -248,21 +188,16 @@ class Tracker:
                 break
         best = max(tried, key=lambda trial: trial.good.sum()) if not enough else enough[0]
         guessed = self._out_of_sight and not self._relocaliser.in_view(best.place.pose).all()
-        # turned otherwise it may be another part of the lattice
-        guessed = guessed and self._turned_since(best.place) > _MOST_TURN
+        # where the last place is turned otherwise, either may be another part of the lattice
+        guessed = guessed and _turn_between(best.place.pose, tried[-1].place.pose) > _MOST_TURN
         if not guessed and (len(enough) < 2 or self._is_least_turn(best.place, enough[1].place)):
-            self._pose = best.place.pose
-            new = self._complete(image, best.fits, best.good)
+            there = self._known._replace(pose=best.place.pose)
+            new = self._search.complete(image, there, best.fits, best.good)
             if new.sum() > good.sum():
+                self._known = there
                 return best.fits, new
-        self._pose = before
         # where it was last, rows that come in may lie as other rows did
         return fits, good & (not self._out_of_sight)
-
-    def _turned_since(self, place: LatticePlace) -> float:
-        """Returns the angle by which a lattice would have turned since the frame before, rad."""
-        turns = np.exp(1j * (place.pose - self._pose)[:, 2])
-        return float(np.abs(np.angle(turns.mean())))
 
     def _tried(
         self, image: Picture, fits: PoseFits, places: list[LatticePlace], own: float
@@ -277,11 +212,11 @@ class Tracker:
             if enough and not self._out_of_sight and _otherwise_turned(enough[0], place):
                 break
             again, none = fits.copy(), np.zeros(len(place.pose), bool)
-            self._pose = place.pose
-            guess = place.pose + np.array([0.0, 0.0, own])
-            good = self._try(image, again, none, (guess, self._photometry, None, SHARE))
-            there = self._relocaliser.in_view(place.pose).sum()
-            out.append(_Trial(place, again, good, bool(good.sum() > _HALF * there)))
+            there = self._known._replace(pose=place.pose)
+            trial = place.pose + np.array([0.0, 0.0, own]), there.photometry, None, SHARE
+            good = self._search.try_missing(image, there, again, none, trial)
+            most = _HALF * self._relocaliser.in_view(place.pose).sum()
+            out.append(_Trial(place, again, good, bool(good.sum() > most)))
         return out
 
     def _is_least_turn(self, best: LatticePlace, other: LatticePlace) -> bool:
@@ -302,103 +237,20 @@ class Tracker:
             )
         return True
 
-    def _reachable(self, guess: Floats) -> Mask:
-        """Tells guesses (units, 3) that are in view, if only in part."""
-        return np.isfinite(guess[:, 0]) & self._relocaliser.in_view(guess, -_HALF)
-
-    def _near(self, fits: PoseFits, guess: Floats) -> Mask:
-        """Tells fits (units,) that ended near where they began, and so are no other unit's."""
-        off = np.linalg.norm(fits.pose[:, :2] - guess[:, :2], axis=1)
-        turned = np.abs(fits.pose[:, 2] - guess[:, 2])
-        return np.asarray((off < self._stray) & (turned < _TURNED))
-
-    def _propagate(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
-        """Tries the units that were not found where their neighbours would have carried them."""
-        for _ in range(_ROUNDS):
-            good &= ~self._neighbours.outliers(fits.pose, good, self._stray)
-            guess = self._neighbours.predict_rigid(self._pose, fits.pose, good, ~good)
-            wanted = self._reachable(guess)
-            if not wanted.any():
-                break
-            photometry = self._photometry * self._gain_change(fits, good)
-            again = self._fit(image, guess, photometry, wanted)
-            new = self._accepted(again, SHARE) & wanted & self._near(again, guess)
-            if not new.any():
-                break
-            fits.take(again, new)
-            good |= new
-        return good
-
-    def _retry_hidden(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
-        """Tries those again that may be hidden in part: place and brightness are known."""
-        photometry = self._photometry * self._gain_change(fits, good)
-        tight = _TIGHT * self._known.noise * np.abs(photometry[:, 0])
-        for _ in range(_RETRIES):
-            if good.all():
-                break
-            before = int(good.sum())
-            for guess in self._hidden_poses(fits, good):
-                for least, scale in ((SHARE, None), (SHARE_KNOWN, tight)):
-                    good = self._try(image, fits, good, (guess, photometry, scale, least))
-            if good.sum() == before:
-                break
-        return good
-
-    def _try(
-        self,
-        image: Picture,
-        fits: PoseFits,
-        good: Mask,
-        trial: tuple[Floats, Floats, Floats | None, float],
-    ) -> Mask:
-        """Fits what is not good from a guess and keeps what is accepted and has not strayed."""
-        guess, photometry, tight, least = trial
-        wanted = ~good & self._reachable(guess)
-        if not wanted.any():
-            return good
-        again = self._fit(image, guess, photometry, wanted, tight)
-        new = self._accepted(again, least) & wanted & self._near(again, guess)
-        both = fits.copy()
-        both.take(again, new)
-        new &= ~self._neighbours.outliers(both.pose, good | new, self._stray)
-        fits.take(again, new)
-        return good | new
-
-    def _hidden_poses(self, fits: PoseFits, good: Mask) -> Iterator[Floats]:
-        """Guesses poses of hidden units: carried on, or stretched with those that are seen.
-
-        Units of these lattices turn with or against their neighbours, so both are tried.
-        """
-        carried = self._neighbours.predict_rigid(self._pose, fits.pose, good, ~good)
-        ahead = self._predicted()
-        yield np.where(np.isfinite(carried), carried, ahead)
-        yield ahead
-        place = self._neighbours.predict_affine(fits.pose, good, ~good)
-        turn = self._neighbours.rotation_size(fits.pose, good, ~good)
-        for angle in (turn, -turn, np.zeros_like(turn)):
-            yield np.column_stack([place, angle])
-
-    def _gain_change(self, fits: PoseFits, good: Mask) -> float:
-        """Measures how much brighter the frame is than the one before."""
-        if not good.any():
-            return 1.0
-        return float(np.median(fits.photometry[good, 0] / self._photometry[good, 0]))
-
     def _update(self, fits: PoseFits, good: Mask, still: bool) -> None:
-        carried = self._neighbours.predict_rigid(self._pose, fits.pose, good, ~good)
-        lost = np.where(np.isfinite(carried), carried, self._pose)
+        known = self._known
+        carried = self._search.neighbours.predict_rigid(known.pose, fits.pose, good, ~good)
+        lost = np.where(np.isfinite(carried), carried, known.pose)
         pose = np.where(good[:, None], fits.pose, lost)
-        moving = good[:, None] & (not still and self._interval > 0)
-        self._velocity = np.where(moving, (pose - self._pose) / (self._interval or 1.0), 0.0)
-        self._photometry = np.where(
-            good[:, None], fits.photometry, self._photometry * self._gain_change(fits, good)
-        )
+        moving = good[:, None] & (not still and known.interval > 0)
+        velocity = np.where(moving, (pose - known.pose) / (known.interval or 1.0), 0.0)
+        dimmed = known.photometry * gain_change(fits, known, good)
+        photometry = np.where(good[:, None], fits.photometry, dimmed)
         relative = fits.noise / np.abs(fits.photometry[:, 0])
-        if not still:
-            self._usual = np.where(good, relative, self._usual)
+        usual = known.usual if still else np.where(good, relative, known.usual)
         self._out_of_sight = not good.any()
         seen = np.where(good[:, None], fits.pose, np.nan)
         self._past = [*self._past, (self._time, seen)][-_PAST:]
-        self._pose = pose
+        self._known = UnitStates(pose, velocity, photometry, usual)
         if good.mean() > _WHOLE:
             self._whole = pose

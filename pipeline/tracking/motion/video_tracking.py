@@ -26,8 +26,9 @@ from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults, unro
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.motion_modes import count_at_rest
 from pipeline.tracking.motion.time_interpolation import at_frame_times, middle_speed
-from pipeline.tracking.motion.tracker import Shutter, Tracker
+from pipeline.tracking.motion.tracker import Tracker
 from pipeline.tracking.motion.unit_looks import GOOD, HIDDEN, POOR_FIT
+from pipeline.tracking.motion.unit_search import Shutter
 from pipeline.tracking.reference_frame import (
     CameraCalibration,
     RecordingSetup,

@@ -1,0 +1,230 @@
+"""Searches the units in one frame: fits them from guesses, judges them, looks where others say."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.runtime import Picture
+from pipeline.tracking.detect import Relocaliser
+from pipeline.tracking.fit import ExposureBlur, PoseFits, PoseFitter, SideWalls
+from pipeline.tracking.geometry import SpecimenOutlines
+from pipeline.tracking.motion.exposure_meter import ExposureMeter
+from pipeline.tracking.motion.prediction import Neighbourhood
+from pipeline.tracking.motion.unit_looks import SHARE, SHARE_KNOWN, UnitLooks
+from sim.core import Floats, Mask, Reals
+
+_QUICK = 2.0
+"""Motion from frame to frame that may blur a unit where the exposure is not known, px."""
+_STRAY = 0.25
+"""A unit so far from where its neighbours carry it is another one, or none, pitches."""
+_TURNED = 0.5
+"""Or so far turned from there, rad."""
+_TIGHT = 6.0
+_SEEN = 0.5
+"""Part of a unit's radius by which its middle may lie out of the picture."""
+_CLOSE = 0.5
+"""Two units nearer to each other than this part of their least distance at rest are one."""
+_ROUNDS = 40
+_RETRIES = 4
+
+
+class Shutter(NamedTuple):
+    """Holds the shutter of a camera."""
+
+    exposure: float | None = None  # of a row, s; without it, the first quick motions tell
+    readout: float = 0.0  # from the first row to the last, s; negative where these are upside down
+    noise: float = 0.0  # residuals to expect of the sensor's noise, levels
+
+
+class UnitStates(NamedTuple):
+    """Holds what is known of the units (units, ...) when a frame comes."""
+
+    pose: Floats  # (units, 3) in the frame before, mm and rad
+    velocity: Floats  # (units, 3) mm/s and rad/s
+    photometry: Floats  # (units, 4) in the frame before
+    usual: Floats  # (units,) residuals, over the gain; zero if unknown
+    interval: float = 0.0  # since that frame, s
+
+
+class UnitSearch:
+    """Searches a specimen's units in a frame.
+
+    Args:
+        specimen: the units.
+        fitter: the camera and the units' looks.
+        relocaliser: tells what is in view.
+        walls: of thick units.
+        shutter: of the camera.
+        blur: by the exposure; without it, none is allowed for.
+
+    Attributes:
+        exposure: of a row, measured if it is not told.
+        looks: of the units in the first frame, once it is there.
+        neighbours: which units tell where others are.
+    """
+
+    def __init__(
+        self,
+        specimen: SpecimenOutlines,
+        fitter: PoseFitter,
+        relocaliser: Relocaliser,
+        walls: SideWalls | None,
+        shutter: Shutter,
+        blur: ExposureBlur | None,
+    ) -> None:
+        self._fitter, self._relocaliser, self._walls = fitter, relocaliser, walls
+        self._shutter, self._blur = shutter, blur
+        self.exposure = ExposureMeter(shutter.exposure, fitter.templates.noise, blur is not None)
+        self.looks: UnitLooks | None = None
+        self.neighbours = Neighbourhood(specimen.centre)
+        self._stray = _STRAY * specimen.pitch
+        middle = specimen.centre.mean(axis=0)
+        self.pixel = 1 / float(fitter.camera.px_per_mm(middle))
+
+    def predicted(self, known: UnitStates) -> Floats:
+        """Extrapolates the poses by their velocities, and redraws the walls there."""
+        ahead = known.pose + known.velocity * known.interval
+        if self._walls is not None:
+            self._walls.redraw(ahead)
+        return ahead
+
+    def fit(
+        self,
+        image: Picture,
+        known: UnitStates,
+        pose: Floats,
+        photometry: Floats,
+        chosen: Mask | None = None,
+        tight: Floats | None = None,
+    ) -> PoseFits:
+        """Fits units as they move while the frame is exposed and read out.
+
+        Arguments but ``known`` are those of `PoseFitter.fit`.
+        """
+        rows = self._fitter.camera.size[1]
+        drift = known.velocity * (self._shutter.readout / rows) if self._shutter.readout else None
+        if self._blur is not None:
+            way = known.velocity * self.exposure.time
+            cos, sin = np.cos(known.pose[:, 2]), np.sin(known.pose[:, 2])
+            x, y = way[:, 0], way[:, 1]
+            own = np.stack([cos * x + sin * y, cos * y - sin * x, way[:, 2]], axis=1)
+            self._blur.redraw(own, chosen)
+        usual = known.usual if chosen is None else None
+        return self._fitter.fit(image, pose, photometry, chosen, tight, usual, drift)
+
+    @property
+    def bend_share(self) -> Reals:
+        """Shares (units, 2) of accelerations that the blurred frame shows, as `ExposureBlur`."""
+        count = len(self._fitter.templates.centre)
+        return np.ones((count, 2), np.float16) if self._blur is None else self._blur.share.copy()
+
+    def accepted(
+        self, fits: PoseFits, known: UnitStates, share: float = SHARE, sharp: bool = True
+    ) -> Mask:
+        """Judges fits; one that its motion may have blurred needs to be seen whole."""
+        assert self.looks is not None, "the first frame is the reference"
+        quick = None
+        if sharp and not self.exposure.time and known.interval > 0:
+            quick = np.linalg.norm((fits.pose - known.pose)[:, :2], axis=1) > _QUICK * self.pixel
+        return self.looks.accepted(fits, known.photometry, share, quick)
+
+    def complete(self, image: Picture, known: UnitStates, fits: PoseFits, good: Mask) -> Mask:
+        """Looks for what is missing, where the good ones say; fits are filled in place."""
+        if not good.any():
+            return good
+        return self._retry_hidden(image, known, fits, self._propagate(image, known, fits, good))
+
+    def try_missing(
+        self,
+        image: Picture,
+        known: UnitStates,
+        fits: PoseFits,
+        good: Mask,
+        trial: tuple[Floats, Floats, Floats | None, float],
+    ) -> Mask:
+        """Fits what is not good from a guess and keeps what is accepted and has not strayed.
+
+        A trial is the guess of poses, photometry, the scale of residuals where the pose is nearly
+        known, and the least share of a unit's information.
+        """
+        guess, photometry, tight, least = trial
+        wanted = ~good & self._reachable(guess)
+        if not wanted.any():
+            return good
+        again = self.fit(image, known, guess, photometry, wanted, tight)
+        new = self.accepted(again, known, least) & wanted & self._near(again, guess)
+        both = fits.copy()
+        both.take(again, new)
+        new &= ~self.neighbours.outliers(both.pose, good | new, self._stray)
+        fits.take(again, new)
+        return good | new
+
+    def collisions(self, fits: PoseFits, good: Mask) -> Mask:
+        """Finds good units (units,) that claim one place."""
+        return self.neighbours.collisions(fits.pose, good, _CLOSE)
+
+    def _reachable(self, guess: Floats) -> Mask:
+        """Tells guesses (units, 3) that are in view, if only in part."""
+        return np.isfinite(guess[:, 0]) & self._relocaliser.in_view(guess, -_SEEN)
+
+    def _near(self, fits: PoseFits, guess: Floats) -> Mask:
+        """Tells fits (units,) that ended near where they began, and so are no other unit's."""
+        off = np.linalg.norm(fits.pose[:, :2] - guess[:, :2], axis=1)
+        turned = np.abs(fits.pose[:, 2] - guess[:, 2])
+        return np.asarray((off < self._stray) & (turned < _TURNED))
+
+    def _propagate(self, image: Picture, known: UnitStates, fits: PoseFits, good: Mask) -> Mask:
+        """Tries the units that were not found where their neighbours would have carried them."""
+        for _ in range(_ROUNDS):
+            good &= ~self.neighbours.outliers(fits.pose, good, self._stray)
+            guess = self.neighbours.predict_rigid(known.pose, fits.pose, good, ~good)
+            wanted = self._reachable(guess)
+            if not wanted.any():
+                break
+            photometry = known.photometry * gain_change(fits, known, good)
+            again = self.fit(image, known, guess, photometry, wanted)
+            new = self.accepted(again, known) & wanted & self._near(again, guess)
+            if not new.any():
+                break
+            fits.take(again, new)
+            good |= new
+        return good
+
+    def _retry_hidden(self, image: Picture, known: UnitStates, fits: PoseFits, good: Mask) -> Mask:
+        """Tries those again that may be hidden in part: place and brightness are known."""
+        assert self.looks is not None, "the first frame is the reference"
+        photometry = known.photometry * gain_change(fits, known, good)
+        tight = _TIGHT * self.looks.noise * np.abs(photometry[:, 0])
+        for _ in range(_RETRIES):
+            if good.all():
+                break
+            before = int(good.sum())
+            for guess in self._hidden_poses(known, fits, good):
+                for least, scale in ((SHARE, None), (SHARE_KNOWN, tight)):
+                    trial = guess, photometry, scale, least
+                    good = self.try_missing(image, known, fits, good, trial)
+            if good.sum() == before:
+                break
+        return good
+
+    def _hidden_poses(self, known: UnitStates, fits: PoseFits, good: Mask) -> Iterator[Floats]:
+        """Guesses poses of hidden units: carried on, or stretched with those that are seen.
+
+        Units of these lattices turn with or against their neighbours, so both are tried.
+        """
+        carried = self.neighbours.predict_rigid(known.pose, fits.pose, good, ~good)
+        ahead = self.predicted(known)
+        yield np.where(np.isfinite(carried), carried, ahead)
+        yield ahead
+        place = self.neighbours.predict_affine(fits.pose, good, ~good)
+        turn = self.neighbours.rotation_size(fits.pose, good, ~good)
+        for angle in (turn, -turn, np.zeros_like(turn)):
+            yield np.column_stack([place, angle])
+
+
+def gain_change(fits: PoseFits, known: UnitStates, good: Mask) -> float:
+    """Measures how much brighter the frame is than the one before."""
+    if not good.any():
+        return 1.0
+    return float(np.median(fits.photometry[good, 0] / known.photometry[good, 0]))
