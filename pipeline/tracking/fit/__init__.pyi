@@ -1,3 +1,5 @@
+from .coarse_level import CoarseLevel as CoarseLevel
+from .coarse_level import coarse_factor as coarse_factor
 from .exposure_blur import ExposureBlur as ExposureBlur
 from .frame_fit import PoseFitter as PoseFitter
 from .patch_correlation import PoseFits as PoseFits

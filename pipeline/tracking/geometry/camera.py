@@ -70,6 +70,23 @@ class Camera:
         flat = self.centre + (pixels - self.centre) * ratio
         return replace(self, homography=fit_homography(points, flat))
 
+    def binned(self, factor: int) -> Camera:
+        """Returns the same of pictures in which blocks of pixels are averaged, whole ones alone.
+
+        A pixel p becomes (p + 1/2) / factor - 1/2.
+        """
+        width, height = (size // factor for size in self.size)
+        shift = (1 / factor - 1) / 2
+        onto = np.array([[1 / factor, 0.0, shift], [0.0, 1 / factor, shift], [0.0, 0.0, 1.0]])
+        made = replace(self, homography=onto @ self.homography, size=(width, height))
+        unit = made.scale * factor / self.scale  # of the radius, where blocks are cut off
+        return replace(
+            made,
+            centre=self.centre / factor + shift,
+            radial=self.radial * np.array([unit**2, unit**4]),
+            fisheye=self.fisheye * unit,
+        )
+
     def _undistorting(self, pixels: Floats) -> Floats:
         """Solves for the radius (...) without distortion over that with it, by Newton's method."""
         first, second = self.radial

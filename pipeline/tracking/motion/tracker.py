@@ -6,13 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.runtime import Picture
-from pipeline.tracking.detect import LatticePlace, Relocaliser
-from pipeline.tracking.fit import ExposureBlur, PoseFits, PoseFitter, SideWalls
-from pipeline.tracking.geometry import SpecimenOutlines
+from pipeline.tracking.detect import LatticePlace
+from pipeline.tracking.fit import PoseFits
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.prediction import latest_velocity
 from pipeline.tracking.motion.unit_looks import SHARE, UnitLooks, white_share
-from pipeline.tracking.motion.unit_search import Shutter, UnitSearch, UnitStates, gain_change
+from pipeline.tracking.motion.unit_search import UnitSearch, UnitStates, gain_change
 from sim.core import Floats, Ints, Mask, Reals
 
 LOG = logging.getLogger(__name__)
@@ -33,8 +32,6 @@ _MOST_TURN = np.deg2rad(45.0)
 """Within a frame of a specimen in sight: half of the turn that leaves squares as they were."""
 _FACE = 0.5
 """Part of a unit's reach within which it shows its face alone."""
-
-_GLOBAL = Shutter()
 
 
 class TrackedFrame(NamedTuple):
@@ -67,12 +64,7 @@ class Tracker:
     """Follows all units through frames given in sequence.
 
     Args:
-        specimen: the units.
-        fitter: the camera and the units' looks; the first frame is its reference.
-        relocaliser: finds the lattice where prediction fails.
-        walls: of thick units.
-        shutter: of the camera.
-        blur: by the exposure; without it, none is allowed for.
+        search: for the units in one frame; the first frame is its reference.
         slopes: of the light; without it, each frame tells its own.
         seen: (units,) which are not hidden in the first frame; others have no reference.
 
@@ -81,27 +73,16 @@ class Tracker:
     """
 
     def __init__(
-        self,
-        specimen: SpecimenOutlines,
-        fitter: PoseFitter,
-        relocaliser: Relocaliser,
-        walls: SideWalls | None = None,
-        shutter: Shutter = _GLOBAL,
-        blur: ExposureBlur | None = None,
-        slopes: LightSlopes | None = None,
-        seen: Mask | None = None,
+        self, search: UnitSearch, slopes: LightSlopes | None = None, seen: Mask | None = None
     ) -> None:
-        self._search = UnitSearch(specimen, fitter, relocaliser, walls, shutter, blur)
-        self.exposure = self._search.exposure
-        self._fitter, self._relocaliser = fitter, relocaliser
-        self._shutter, self._slopes = shutter, slopes
-        self._in_motion = bool(shutter.readout) or blur is not None
+        self._search, self._slopes = search, slopes
+        self.exposure, self._relocaliser = search.exposure, search.relocaliser
         self._past: list[tuple[float, Floats]] = []
         self._out_of_sight, self._time = False, 0.0
-        self._seen = np.ones(specimen.count, bool) if seen is None else seen
-        self._centre = specimen.centre
-        pose, photometry = fitter.start(1.0)
-        self._known = UnitStates(pose, np.zeros_like(pose), photometry, np.zeros(specimen.count))
+        self._centre = search.fitter.templates.centre
+        self._seen = np.ones(len(self._centre), bool) if seen is None else seen
+        pose, photometry = search.fitter.start(1.0)
+        self._known = UnitStates(pose, np.zeros_like(pose), photometry, np.zeros(len(pose)))
         self._whole = pose
 
     def step(self, image: Picture, time: float) -> TrackedFrame:
@@ -110,16 +91,18 @@ class Tracker:
         interval, self._time = 0.0 if first else time - self._time, time
         known = self._known = self._known._replace(interval=interval)
         fits = self._search.fit(image, known, self._search.predicted(known), known.photometry)
-        if not first and self._in_motion:
+        if not first:
+            self._search.refit_missed(image, known, fits)
+        if not first and self._search.allows_motion:
             known = self._known = self._with_velocity(fits.pose)
             if self.exposure.open:
                 self._measure_exposure(image, fits)
-            if self._shutter.readout or self.exposure.time:
+            if self._search.shutter.readout or self.exposure.time:
                 fits = self._search.fit(image, known, fits.pose, fits.photometry)
         if first:
-            templates, noise = self._fitter.templates, self._shutter.noise
+            templates, noise = self._search.fitter.templates, self._search.shutter.noise
             self._search.looks = UnitLooks(fits, templates, noise, self._seen)
-            self._fitter.full = np.nan_to_num(fits.information)
+            self._search.fitter.full = np.nan_to_num(fits.information)
         good = self._search.complete(image, known, fits, self._search.accepted(fits, known))
         jumped = good.mean() < _FEW
         if jumped and not first:
@@ -166,8 +149,8 @@ class Tracker:
         """Says why units are missing, by what the frame shows where they were last."""
         assert self._search.looks is not None, "the first frame is the reference"
         pose, lost, white = self._known.pose, np.flatnonzero(~good), np.zeros(len(good))
-        middle = self._fitter.camera.project(self._centre[lost] + pose[lost, :2])
-        reach = _FACE * self._fitter.templates.reach[lost] / self._search.pixel
+        middle = self._search.fitter.camera.project(self._centre[lost] + pose[lost, :2])
+        reach = _FACE * self._search.fitter.templates.reach[lost] / self._search.pixel
         white[lost] = white_share(image, middle, reach)
         return self._search.looks.reasons(fits, good, self._relocaliser.in_view(pose), white)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.runtime import Picture
 from pipeline.tracking.detect import Relocaliser
-from pipeline.tracking.fit import ExposureBlur, PoseFits, PoseFitter, SideWalls
+from pipeline.tracking.fit import CoarseLevel, ExposureBlur, PoseFits, PoseFitter, SideWalls
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion.exposure_meter import ExposureMeter
 from pipeline.tracking.motion.prediction import Neighbourhood
@@ -37,6 +37,9 @@ class Shutter(NamedTuple):
     noise: float = 0.0  # residuals to expect of the sensor's noise, levels
 
 
+_GLOBAL = Shutter()
+
+
 class UnitStates(NamedTuple):
     """Holds what is known of the units (units, ...) when a frame comes."""
 
@@ -57,11 +60,14 @@ class UnitSearch:
         walls: of thick units.
         shutter: of the camera.
         blur: by the exposure; without it, none is allowed for.
+        coarse: finds units from farther away, where a pitch has pixels enough for it.
 
     Attributes:
+        fitter, relocaliser, shutter: as given.
         exposure: of a row, measured if it is not told.
         looks: of the units in the first frame, once it is there.
         neighbours: which units tell where others are.
+        pixel: size of a pixel at the middle of the specimen, mm.
     """
 
     def __init__(
@@ -69,12 +75,13 @@ class UnitSearch:
         specimen: SpecimenOutlines,
         fitter: PoseFitter,
         relocaliser: Relocaliser,
-        walls: SideWalls | None,
-        shutter: Shutter,
-        blur: ExposureBlur | None,
+        walls: SideWalls | None = None,
+        shutter: Shutter = _GLOBAL,
+        blur: ExposureBlur | None = None,
+        coarse: CoarseLevel | None = None,
     ) -> None:
-        self._fitter, self._relocaliser, self._walls = fitter, relocaliser, walls
-        self._shutter, self._blur = shutter, blur
+        self.fitter, self.relocaliser, self._walls = fitter, relocaliser, walls
+        self.shutter, self._blur, self._coarse = shutter, blur, coarse
         self.exposure = ExposureMeter(shutter.exposure, fitter.templates.noise, blur is not None)
         self.looks: UnitLooks | None = None
         self.neighbours = Neighbourhood(specimen.centre)
@@ -102,8 +109,8 @@ class UnitSearch:
 
         Arguments but ``known`` are those of `PoseFitter.fit`.
         """
-        rows = self._fitter.camera.size[1]
-        drift = known.velocity * (self._shutter.readout / rows) if self._shutter.readout else None
+        rows = self.fitter.camera.size[1]
+        drift = known.velocity * (self.shutter.readout / rows) if self.shutter.readout else None
         if self._blur is not None:
             way = known.velocity * self.exposure.time
             cos, sin = np.cos(known.pose[:, 2]), np.sin(known.pose[:, 2])
@@ -111,12 +118,43 @@ class UnitSearch:
             own = np.stack([cos * x + sin * y, cos * y - sin * x, way[:, 2]], axis=1)
             self._blur.redraw(own, chosen)
         usual = known.usual if chosen is None else None
-        return self._fitter.fit(image, pose, photometry, chosen, tight, usual, drift)
+        return self.fitter.fit(image, pose, photometry, chosen, tight, usual, drift)
+
+    def fit_coarse_first(
+        self,
+        image: Picture,
+        known: UnitStates,
+        guess: Floats,
+        photometry: Floats,
+        chosen: Mask,
+    ) -> PoseFits:
+        """Fits the chosen units from where the coarse level finds them, if there is one."""
+        if self._coarse is not None:
+            found = self._coarse.fit(image, guess, photometry, chosen)
+            there = self._near(found, guess) & (found.share > SHARE_KNOWN)
+            guess = np.where(there[:, None], found.pose, guess)
+        return self.fit(image, known, guess, photometry, chosen)
+
+    def refit_missed(self, image: Picture, known: UnitStates, fits: PoseFits) -> None:
+        """Fits anew, in place, units that went farther than their own pixels tell."""
+        if self._coarse is None:
+            return
+        ahead = self.predicted(known)
+        missed = ~self.accepted(fits, known, sharp=False) & self._reachable(ahead)
+        if not missed.any():
+            return
+        again = self.fit_coarse_first(image, known, ahead, known.photometry, missed)
+        fits.take(again, missed & (again.share > np.nan_to_num(fits.share)))
+
+    @property
+    def allows_motion(self) -> bool:
+        """Tells whether units are fitted as they move while a frame is exposed or read out."""
+        return bool(self.shutter.readout) or self._blur is not None
 
     @property
     def bend_share(self) -> Reals:
         """Shares (units, 2) of accelerations that the blurred frame shows, as `ExposureBlur`."""
-        count = len(self._fitter.templates.centre)
+        count = len(self.fitter.templates.centre)
         return np.ones((count, 2), np.float16) if self._blur is None else self._blur.share.copy()
 
     def accepted(
@@ -166,7 +204,7 @@ class UnitSearch:
 
     def _reachable(self, guess: Floats) -> Mask:
         """Tells guesses (units, 3) that are in view, if only in part."""
-        return np.isfinite(guess[:, 0]) & self._relocaliser.in_view(guess, -_SEEN)
+        return np.isfinite(guess[:, 0]) & self.relocaliser.in_view(guess, -_SEEN)
 
     def _near(self, fits: PoseFits, guess: Floats) -> Mask:
         """Tells fits (units,) that ended near where they began, and so are no other unit's."""
@@ -183,7 +221,7 @@ class UnitSearch:
             if not wanted.any():
                 break
             photometry = known.photometry * gain_change(fits, known, good)
-            again = self.fit(image, known, guess, photometry, wanted)
+            again = self.fit_coarse_first(image, known, guess, photometry, wanted)
             new = self.accepted(again, known) & wanted & self._near(again, guess)
             if not new.any():
                 break

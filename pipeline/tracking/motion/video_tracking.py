@@ -17,7 +17,14 @@ from pipeline.tracking.detect import (
     classify_markings,
     orientation_text,
 )
-from pipeline.tracking.fit import ExposureBlur, PoseFitter, SideWalls, learn_templates
+from pipeline.tracking.fit import (
+    CoarseLevel,
+    ExposureBlur,
+    PoseFitter,
+    SideWalls,
+    coarse_factor,
+    learn_templates,
+)
 from pipeline.tracking.frames import BrokenOffError, Frame, within_interval
 from pipeline.tracking.geometry import SpecimenOutlines, arm_swing, lens_variance
 from pipeline.tracking.motion import uncertainty
@@ -28,7 +35,7 @@ from pipeline.tracking.motion.motion_modes import count_at_rest
 from pipeline.tracking.motion.time_interpolation import at_frame_times, middle_speed
 from pipeline.tracking.motion.tracker import Tracker
 from pipeline.tracking.motion.unit_looks import GOOD, HIDDEN, POOR_FIT
-from pipeline.tracking.motion.unit_search import Shutter
+from pipeline.tracking.motion.unit_search import Shutter, UnitSearch
 from pipeline.tracking.reference_frame import (
     CameraCalibration,
     RecordingSetup,
@@ -60,6 +67,10 @@ _UNSURE = 0.25
 _VAGUE = 1 / 6, 5.0
 """Standard deviation of a pose that is as good as lost, px, and over the usual: three of these are
 half a pixel."""
+_FINE = 60.0
+"""Pixels from unit to unit from which on such limits are parts of the pitch: what a motion leaves
+open is a length, and a camera of twice as many pixels must not lose what one of half as many
+keeps."""
 _CHANGED = 0.005
 """Part of the pixels that differ in a picture that is shown again, at most."""
 
@@ -124,13 +135,14 @@ def track_video(
     near = uncertainty.nearest(specimen.centre)
     rest = count_at_rest(motion[: shown.averaged, :, :2].astype(float), near)
     missed = np.zeros_like(motion)
+    limit = max(calibration.pixel, specimen.pitch / _FINE)  # mm
     if (setup.readout or exposure) and can_interpolate(time):
         late = row_times(motion, specimen, calibration, setup)
         bend = exposure**2 / 24 * shares[..., _OF_DOF]
         motion, sigmas, missed = at_frame_times(motion, sigmas, time, late, bend, near, rest)
-        _lose_unsure(motion, missed, qualities, calibration.pixel)
+        _lose_unsure(motion, missed, qualities, limit)
     _count_from_rest(motion, rest, np.nan_to_num(places.offset).astype(np.float32))
-    _add_variances(missed, motion, places, specimen, calibration)
+    _add_variances(missed, motion, places, specimen, calibration, limit)
     remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     qualities[np.isnan(motion[..., 0]) & (qualities == GOOD)] = HIDDEN  # as the supports are
     faults = timing_faults(time, motion, sigmas, same)
@@ -143,7 +155,7 @@ def track_video(
     if setup.follows_supports and setup.held is not None:
         missed += camera_variance(sigma, specimen.centre, setup.held)
     sigma = np.where(np.isfinite(motion), np.hypot(sigma, np.sqrt(missed)), np.nan)
-    vague = _vague(sigma, calibration.pixel)
+    vague = _vague(sigma, limit)
     motion[vague], sigma[vague], qualities[vague] = np.nan, np.nan, POOR_FIT
     moved = motion[..., :2].astype(float)
     if doubt := start_doubt(moved, specimen.centre, calibration.residual, calibration.pixel):
@@ -152,13 +164,15 @@ def track_video(
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended, rest)
 
 
-def _lose_unsure(motion: Reals, missed: Reals, qualities: NDArray[np.int8], pixel: float) -> None:
+def _lose_unsure(motion: Reals, missed: Reals, qualities: NDArray[np.int8], length: float) -> None:
     """Marks, in place, poses (frames, units) as lost that are not known at their frames' times.
+
+    The length, mm, is that of a pixel, or of what counts as one.
 
     Raises:
         UserError: that are all.
     """
-    off = np.sqrt(missed[..., :2].max(axis=-1)) / pixel
+    off = np.sqrt(missed[..., :2].max(axis=-1)) / length
     usual = np.median(off, axis=1, keepdims=True)  # one unit alone has met with noise
     unsure = (off > _UNSURE) & (usual > _UNSURE / 5)
     motion[unsure], qualities[unsure] = np.nan, POOR_FIT
@@ -180,9 +194,10 @@ def _add_variances(
     places: RestPlaces,
     specimen: SpecimenOutlines,
     calibration: CameraCalibration,
+    length: float,
 ) -> None:
     """Adds variances of motions by those of rest places and camera; warns of too large ones."""
-    camera, limit, far = calibration.camera, (_VAGUE[0] * calibration.pixel) ** 2, 0
+    camera, limit, far = calibration.camera, (_VAGUE[0] * length) ** 2, 0
     for frames, bent in lens_variance(camera, calibration.alike, specimen.centre, motion):
         far += int((bent[..., :2].max(axis=-1) > limit).sum())
         missed[frames] += places.swing_variance(motion[frames, :, 2]) + bent
@@ -194,9 +209,9 @@ def _add_variances(
         )
 
 
-def _vague(sigma: Reals, pixel: float) -> Mask:
+def _vague(sigma: Reals, length: float) -> Mask:
     """Marks poses (frames, units) of which next to nothing is known, beside the others."""
-    place = sigma[..., :2].max(axis=-1) / pixel
+    place = sigma[..., :2].max(axis=-1) / length
     known = np.isfinite(place)
     least, times = _VAGUE
     return known & (place > max(least, times * float(np.median(place[known]))))
@@ -309,4 +324,9 @@ def _tracker(
     shutter = Shutter(setup.exposure, setup.readout, noise)
     fitter, slopes = PoseFitter(camera, templates), LightSlopes(specimen.count, shown.averaged)
     seen = outlines_seen(calibration.outlines)
-    return Tracker(specimen, fitter, relocaliser, walls, shutter, blur, slopes, seen)
+    factor, coarse = coarse_factor(specimen, camera), None
+    if factor > 1:
+        told = calibration.blur, setup.kind
+        coarse = CoarseLevel(shown.image, specimen, camera, told, factor)
+    search = UnitSearch(specimen, fitter, relocaliser, walls, shutter, blur, coarse)
+    return Tracker(search, slopes, seen)

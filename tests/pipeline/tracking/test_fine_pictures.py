@@ -1,0 +1,60 @@
+"""Pictures of many pixels a unit: what moves quickly is found as in those of fewer."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from benchmarks.tracking.clip_scripts import GRID, ClipScript
+from benchmarks.tracking.rendering import View
+from benchmarks.tracking.wild_clips import errors, film, tracked
+from pipeline.tracking.geometry import Camera
+from sim.core import Floats
+
+CLIP = ClipScript(
+    pace=lambda time: 2 * np.sin(2 * np.pi * 2 * time) ** 2,
+    times=np.arange(6) / 30,
+    grid=GRID | {"grid": [5, 5]},
+)
+"""Units turn by up to 9 deg from one frame to the next, and go up to a fifth of a pitch."""
+
+
+def view(pitch: float, exposure: float = 0.0) -> View:
+    """Shows the clip with so many pixels from unit to unit."""
+    side = int(7 * pitch)
+    return View(size=(side, side), scale=pitch / 15, exposure=exposure)
+
+
+@pytest.mark.parametrize("pitch", [120, pytest.param(60, marks=pytest.mark.slow)])
+def test_quick_motions_are_followed_however_fine_pictures_are(pitch: int, tmp_path: Path) -> None:
+    clip = film(CLIP._replace(view=view(pitch)), tmp_path / "unused.mkv")
+    found = errors(clip, tracked(clip))
+    assert (found.lost, found.gross) == (0.0, 0)
+    assert found.rms < 0.01
+
+
+@pytest.mark.slow
+def test_what_a_blur_leaves_open_is_a_length(tmp_path: Path) -> None:
+    """Pixels of half the size lose no more poses for it."""
+    script = CLIP._replace(pace=lambda time: np.sin(2 * np.pi * 3 * time) ** 2)
+    script = script._replace(view=view(120, 0.008), times=np.arange(14) / 30)
+    clip = film(script, tmp_path / "unused.mkv")
+    assert errors(clip, tracked(clip)).lost == 0.0
+
+
+@pytest.mark.parametrize("fisheye", [0.0, 0.6])
+def test_a_camera_of_averaged_pixels_sees_them(fisheye: float) -> None:
+    """Blocks are averaged from the first pixel on; what is over at the far sides is cut off."""
+    matrix = np.array([[8.0, 0.1, 60.0], [0.2, -8.0, 500.0], [1e-4, 0.0, 1.0]])
+    camera = Camera(matrix, np.array([330.0, 255.0]), np.array([0.02, -0.01]), (643, 509))
+    camera = replace(camera, fisheye=fisheye)
+    points = np.random.default_rng(1).uniform([5, 10], [60, 50], (20, 2))
+    coarse = camera.binned(4)
+    assert coarse.size == (160, 127)
+    expected: Floats = (camera.project(points) + 0.5) / 4 - 0.5
+    np.testing.assert_allclose(coarse.project(points), expected, atol=1e-9)
+    image = np.arange(508, dtype=np.float32)[:, None] * np.ones(640, np.float32)
+    small = cv2.resize(image, (160, 127), interpolation=cv2.INTER_AREA)
+    np.testing.assert_allclose(small[:, 0], (np.arange(127) + 0.5) * 4 - 0.5, rtol=1e-5)
