@@ -116,7 +116,7 @@ def own_rate(path: Path) -> float | None:
 def video_length(path: Path, rate: float | None = None) -> float:
     """Reads how long a video is, s, at a rate if one is given; infinite where nothing tells."""
     if path.is_dir():
-        return (places(path)[-1] + 1) / rate if rate else math.inf
+        return (places(pictures(path))[-1] + 1) / rate if rate else math.inf
     try:
         with open_video(path) as container:
             return stream_length(container, container.streams.video[0], rate)
@@ -152,7 +152,10 @@ def _filmed(path: Path, start: float, end: float, rate: float | None) -> Iterato
     except FileNotFoundError as error:
         raise UserError("no such video", file=path, key="video", remedy="check the path") from error
     except av.FFmpegError as error:
-        remedy = "give a video that ffprobe can read; copy the file again if it is broken"
+        remedy = (
+            "copy the file again from the camera; if a player shows it, save it from there as an"
+            " .mp4 (H.264), or as numbered .png pictures in a folder"
+        )
         raise UserError(
             f"not a readable video: {error.strerror}", file=path, key="video", remedy=remedy
         ) from error

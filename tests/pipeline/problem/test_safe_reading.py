@@ -137,6 +137,15 @@ def test_a_playlist_opens_no_other_files(tmp_path: Path) -> None:
         list(video.read_frames(path))
 
 
+def test_a_video_that_cannot_be_read_is_to_be_mended_without_other_tools(tmp_path: Path) -> None:
+    path = tmp_path / "clip.mp4"
+    path.write_bytes(b"no video")
+    with pytest.raises(UserError, match="not a readable video") as caught:
+        list(video.read_frames(path))
+    assert "save it" in str(caught.value.remedy)
+    assert "ffprobe" not in str(caught.value)
+
+
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9">{}</svg>'
 TRIANGLE = '<path d="M0 0 L9 0 L9 9 Z"/>'
 HOSTILE = {
