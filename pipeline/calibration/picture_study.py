@@ -11,7 +11,7 @@ from pipeline.calibration.inputs import KnownPictures, RigidParts, SpecimenPictu
 from pipeline.problem.fields import csv_columns
 from pipeline.runtime import UserError
 from pipeline.tracking.detect import detect_lattice
-from pipeline.tracking.frames import read_picture, read_pictures
+from pipeline.tracking.frames import pictures, read_picture, read_pictures
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion import Patch, follow_patch
 from sim.core import Floats
@@ -37,24 +37,28 @@ def moved_parts(asked: RigidParts, folder: Path) -> Iterator[MovedPart]:
     """
     place = folder / asked.folder
     table = place / asked.reference
-    pictures = numbered_pictures(place)
+    numbered = numbered_pictures(place)
     first = _number(place / asked.first)
     for frame, part, *motion in csv_columns.read_columns(table, asked.columns):
         if int(frame) == first:
             continue
-        if int(frame) not in pictures or not 0 <= part < len(asked.parts):
+        if int(frame) not in numbered or not 0 <= part < len(asked.parts):
             what = "a line tells of a picture or a part that is not there"
             remedy = "delete the line, add the picture, or describe the part"
             raise UserError(what, file=table, value=f"{frame:g}, {part:g}", remedy=remedy)
         one = asked.parts[int(part)]
-        before, after = read_pictures(place / asked.first, pictures[int(frame)])
+        before, after = read_pictures(place / asked.first, numbered[int(frame)])
         patch = Patch(before, after, np.array(one.outline), np.array(one.centre))
         yield MovedPart(int(frame), int(part), patch, np.array(motion))
 
 
 def numbered_pictures(folder: Path) -> dict[int, Path]:
-    """Lists the pictures of a folder by the number at the end of their names."""
-    return {_number(path): path for path in sorted(folder.glob("*.png"))}
+    """Lists the pictures of a folder by the number at the end of their names.
+
+    Raises:
+        UserError: there are none.
+    """
+    return {_number(path): path for path in pictures(folder)}
 
 
 def _number(path: Path) -> int:

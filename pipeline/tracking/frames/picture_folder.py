@@ -26,14 +26,14 @@ def read_folder(path: Path, start: float, end: float, rate: float | None) -> Ite
     """
     if rate is None:
         raise untimed(path, "pictures have no times")
-    inside = takewhile(lambda frame: frame.time <= end, _pictured(path, rate))
+    inside = takewhile(lambda frame: frame.time <= end, _pictured(path, pictures(path), rate))
     yield from (frame for frame in inside if start <= frame.time)
 
 
-def _pictured(path: Path, rate: float) -> Iterator[Frame]:
-    count, times = 0, [place / rate for place in places(path)]
+def _pictured(path: Path, found: list[Path], rate: float) -> Iterator[Frame]:
+    count, times = 0, [place / rate for place in places(found)]
     try:
-        for count, image in enumerate(images(path), start=1):
+        for count, image in enumerate(images(found), start=1):
             yield Frame(count - 1, times[count - 1], image)
     except UserError as error:
         if count == 0:
@@ -41,16 +41,12 @@ def _pictured(path: Path, rate: float) -> Iterator[Frame]:
         raise broken_off(path, f"{error.file} cannot be read", count, times[count - 1]) from error
 
 
-def places(folder: Path) -> list[int]:
-    """Numbers the folder's pictures, from zero, by the counter in their names.
+def places(found: list[Path]) -> list[int]:
+    """Numbers a folder's pictures, from zero, by the counter in their names.
 
     Its smallest step is that of a frame; where names differ in more than a counter, or steps are
     no multiples of one, none is taken to be missing.
-
-    Raises:
-        UserError: there are none.
     """
-    found = pictures(folder)
     plain = list(range(len(found)))
     if len({_wording(path) for path in found}) > 1:
         return plain
@@ -84,9 +80,10 @@ def has_pictures(folder: Path) -> bool:
 
 
 def _listed(folder: Path) -> list[Path]:
+    inside = folder.iterdir() if folder.is_dir() else ()
     return [
         path
-        for path in folder.iterdir()
+        for path in inside
         if path.suffix.lower() in _SUFFIXES and not path.name.startswith(".")
     ]
 
@@ -100,15 +97,14 @@ def _wording(path: Path) -> str:
     return re.sub(r"\d+", "0", path.stem)
 
 
-def images(folder: Path) -> Iterator[Picture]:
-    """Reads their brightness, one after the other.
+def images(found: list[Path]) -> Iterator[Picture]:
+    """Reads the brightness of a folder's pictures, one after the other.
 
     The first, the last and the one between tell how many levels the camera has.
 
     Raises:
         UserError: one cannot be read, or holds several.
     """
-    found = pictures(folder)
     some = (read_levels(found[place]) for place in (0, len(found) // 2, -1))
     top = full_scale([levels for levels in some if levels is not None])
     for path in found:
