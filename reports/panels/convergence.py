@@ -20,6 +20,8 @@ SIDES: tuple[tuple[tuple[float, float], dict[str, Any]], ...] = (
     ((0, 4.5), {"ha": "right", "va": "bottom"}),
 )
 """Places of a number beside its mark: shifts in points, and which corner is shifted."""
+_ROUNDING = 1e-6
+"""Share of the least mean loss below which that of a load case is not shown."""
 
 
 def loss_label(loss: xr.DataArray) -> str:
@@ -36,11 +38,19 @@ def loss_history(axes: Axes, design: xr.Dataset) -> None:
         _history(axes, history, colour, str(method).upper())
     style.log_values(axes)
     axes.set(xlabel="Evaluation", ylabel=loss_label(design["best_loss"]), xlim=(0, None))
-    axes.set_ylim(0.55 * float(design["loss"].min()), None)
+    axes.set_ylim(_lowest(design), None)
     for method in design["method"].values:
         _name_best(axes, design.sel({"method": method}))
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), ncols=2, columnspacing=1.2)
+
+
+def _lowest(design: xr.Dataset) -> float:
+    """Returns the lower limit of the losses: below the mean's, and below that of any load case."""
+    mean = float(design["loss"].min())
+    cases = design["loss_case"].where(design["accepted"] > 0)
+    seen = cases.where(cases > _ROUNDING * mean)  # of a case that is zero but for rounding, none
+    return float(np.fmin(0.55 * mean, 0.9 * float(seen.min())))
 
 
 def _history(axes: Axes, history: xr.Dataset, colour: str, name: str) -> None:

@@ -27,7 +27,7 @@ def loss_panel(axes: Axes, design: xr.Dataset, quoted: bool) -> None:
 def _paper_line(axes: Axes, design: xr.Dataset) -> None:
     target = paper_loss(float(design["loss"].isel(method=0, evaluation=0)))
     axes.axhline(target, color=style.GREY, lw=0.7, ls=(0, (4, 2)), zorder=1)
-    axes.set_ylim(0.55 * min(target, float(design["loss"].min())), None)
+    axes.set_ylim(min(0.55 * target, axes.get_ylim()[0]), None)
     across = ("axes fraction", "data")
     words, at = "paper’s −70 %", (1.0, target)
     style.note(axes, at, words, ha="right", color=style.GREY, xycoords=across)

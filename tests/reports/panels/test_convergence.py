@@ -6,6 +6,8 @@ from matplotlib.transforms import Bbox
 
 from reports.panels.convergence import loss_history
 
+CASES = ("method", "case", "evaluation")
+
 
 def _history(losses: list[float]) -> xr.Dataset:
     """Makes the design of a search that accepted every evaluation."""
@@ -14,7 +16,7 @@ def _history(losses: list[float]) -> xr.Dataset:
     return xr.Dataset(
         {
             "loss": (("method", "evaluation"), loss[None]),
-            "loss_case": (("method", "case", "evaluation"), loss[None, None]),
+            "loss_case": (CASES, loss[None, None]),
             "accepted": ones,
             "violation": (ones[0], np.zeros((1, loss.size))),
             "best_loss": ("method", [loss.min()]),
@@ -38,3 +40,15 @@ def test_number_of_the_best_loss_stands_clear_of_the_curve(best: int) -> None:
     assert label.get_text() == "0.0345"
     assert not any(path.intersects_bbox(box, filled=False) for path in paths)
     assert axes.bbox.x1 >= box.x1 - 1.0
+
+
+def test_the_curve_of_every_load_case_is_on_the_panel() -> None:
+    """Takes the lower limit from the least of them, where that is far below their mean."""
+    made = _history([1.0, 0.4, 0.2])
+    cases = np.stack([1.9 * made["loss"].values, 0.1 * made["loss"].values], axis=1)
+    axes = Figure().add_subplot()
+    loss_history(axes, made.drop_vars("loss_case").assign(loss_case=(CASES, cases)))
+    low, high = axes.get_ylim()
+    assert low < cases.min() < cases.max() < high
+    loss_history(alone := Figure().add_subplot(), made)
+    assert alone.get_ylim()[0] == pytest.approx(0.55 * 0.2)
