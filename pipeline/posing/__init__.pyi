@@ -44,6 +44,7 @@ from .structure_variables import network_variables as network_variables
 from .structure_variables import read_design as read_design
 from .structure_variables import spread as spread
 from .structure_variables import unit_coordinates as unit_coordinates
+from .time_refinement import relative_errors as relative_errors
 from .to_scene import BENT as BENT
 from .to_scene import altered_lattice_of as altered_lattice_of
 from .to_scene import contact_laws as contact_laws

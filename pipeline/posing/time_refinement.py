@@ -95,16 +95,16 @@ def _time_step(run: Response) -> float:
     return float(np.max(steps))  # NaN if one is, wherever it stands
 
 
-def relative_error(motion: Floats, target: Floats, along: Floats, weights: Floats) -> float:
-    """Computes the relative L2 error of motions (n_cases, n_times, n_units, 3), without units.
+def relative_errors(motion: Floats, target: Floats, along: Floats) -> Floats:
+    """Computes the relative L2 errors (n_cases,) of motions (n_cases, n_times, n_units, 3).
 
-    It is the weighted mean of those of the cases, as reports tell it: pooled squares would be
-    ruled by the case that moves most.
+    Motions and targets are without units; their weighted mean is the error of a structure, since
+    pooled squares would be ruled by the case that moves most.
     """
     missed, size = (
         np.trapezoid((each**2).sum(axis=(-2, -1)), along) for each in (motion - target, target)
     )
-    return float(weights @ np.sqrt(missed / size) / weights.sum())
+    return np.asarray(np.sqrt(missed / size))
 
 
 def _numbers(
@@ -142,6 +142,6 @@ def _of_structure(
         gap=min(float(each.gap.min()) for each in clear),
         overlaps=max(int(each.overlaps.max()) for each in clear),
         contact_pairs=max(int(each.contact_pairs.max()) for each in seen),
-        error=relative_error(moved, aim, shown, weights) if mimics else np.nan,
+        error=np.average(relative_errors(moved, aim, shown), weights=weights) if mimics else np.nan,
         time_step=_time_step(run),
     )

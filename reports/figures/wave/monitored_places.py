@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from pipeline.posing import relative_errors
 from pipeline.problem import Problem
-from reports.figures.loading_path import interest, scales, squares
+from reports.figures.loading_path import interest, scales
 from reports.study import RigidUnits, middle_of_top_edge, on_lattice, unit_at
 
 Mark = str | tuple[int, int, int]
@@ -42,8 +43,8 @@ def first_structure(problem: Problem, response: xr.Dataset) -> RigidUnits:
 
 def relative_error(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     """Finds the relative L2 error (structure, case) of the surroundings over the whole history."""
-    inside, scale = interest(response), scales(problem)
-    intact = inside.sel(structure="intact")
-    missed = squares(inside - intact, scale).sum("unit").integrate("time")
-    size = squares(intact, scale).sum("unit").integrate("time")
-    return (missed / size) ** 0.5
+    dims = ("structure", "case", "time", "unit", "dof")
+    moved = interest(response).transpose(*dims) / np.array(scales(problem))
+    intact, along = moved.sel(structure="intact").values, response["time"].values
+    found = [relative_errors(each, intact, along) for each in moved.values]
+    return xr.DataArray(found, {"structure": moved["structure"]}, dims[:2])
