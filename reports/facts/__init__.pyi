@@ -20,6 +20,7 @@ from .fact_records import facts_of as facts_of
 from .fact_records import grouped as grouped
 from .fact_records import number as number
 from .fact_records import percent as percent
+from .fact_records import printed as printed
 from .fact_records import share as share
 from .fact_records import table as table
 from .fact_records import within as within

@@ -12,16 +12,15 @@ from .curves import path_axes as path_axes
 from .curves import structure_curves as structure_curves
 from .facts import loss_facts as loss_facts
 from .facts import scene_facts as scene_facts
-from .figure import TALLEST_SNAPSHOTS as TALLEST_SNAPSHOTS
 from .figure import axis as axis
 from .figure import credit as credit
 from .figure import design_panels as design_panels
 from .figure import fields as fields
 from .figure import marks as marks
+from .load_legend import LoadLegend as LoadLegend
 from .measures import interest as interest
 from .measures import over_cases as over_cases
 from .measures import scales as scales
-from .measures import squares as squares
 from .snapshot_grid import SnapshotLayout as SnapshotLayout
 from .snapshot_grid import SnapshotStructure as SnapshotStructure
 from .snapshot_grid import shade_bar as shade_bar

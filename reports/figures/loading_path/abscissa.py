@@ -13,7 +13,7 @@ from pipeline.problem.sections import (
     selected_units,
     single_drives,
 )
-from reports.facts import headed
+from reports.facts import headed, printed
 from reports.figures.loading_path.drive_response import driven_displacement
 from sim.core import Floats
 
@@ -72,10 +72,10 @@ class Abscissa:
         value = self.values[sample]
         if self.static and abs(value) < _NEGLIGIBLE * float(np.abs(self.values).max()):
             value = 0.0  # a smooth ramp does not begin at nought
-        words = f"{value:.3g} {self.unit}".replace(" °", "°")
+        words = printed(f"{value:.3g}", self.unit).replace(" °", "°")
         if self.strain is None:
             return words
-        share = 100.0 * self.strain * value / self.values[-1]
+        share = 100.0 * self.strain * abs(value / self.values[-1])
         return f"{words} ({share:.2g} %)"
 
 

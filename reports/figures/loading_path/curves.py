@@ -1,10 +1,11 @@
 """Draws curves along the path: the measure, contraction, reaction, imperfect copies."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from pipeline.problem import Problem
@@ -19,19 +20,13 @@ from reports.figures.loading_path.abscissa import (
     structures,
 )
 from reports.figures.loading_path.drive_response import drive_response
+from reports.figures.loading_path.load_legend import curve_look
 from reports.figures.loading_path.measures import Measure, over_cases
 from reports.panels import measured_overlay
 from reports.study import RedesignResults, StudyResults, display_name
 
 BAND = (5.0, 95.0)
 """Percentiles of the imperfect copies that a band spans."""
-CASE_STYLES = (
-    ("-", 0.0),
-    ((0, (4.0, 1.5)), 0.3),
-    ((0, (1.2, 1.2)), 0.45),
-    ((0, (5.0, 1.2, 1.2, 1.2)), 0.55),
-)
-"""Dashes and share of white of the curves of one load case after the other."""
 RIGHT_AXIS = 9.0
 """Room for the labels of an axis on the right, mm."""
 
@@ -54,7 +49,7 @@ def path_axes(axes: Axes, path: Abscissa, label: str) -> None:
     )
     above.set_xlabel("Paper’s label ε (%)", labelpad=2.5, fontsize=style.SMALL)
     above.xaxis.set_major_locator(FixedLocator(list(ratio * path.values[list(path.shown)])))
-    above.xaxis.set_major_formatter(lambda value, _: f"{value:.2g}")
+    above.xaxis.set_major_formatter(lambda value, _: f"{abs(value):.2g}")  # no strain is negative
 
 
 def structure_curves(
@@ -66,20 +61,25 @@ def structure_curves(
     """
     loads = load_names(problem, values)
     for name in names:
-        width, order = (1.8, 3) if name == "intact" else (1.2, 4)
-        title = display_name(problem, name)
+        order, title = 3 if name == "intact" else 4, display_name(problem, name)
         for number, load in enumerate(loads):
-            dashes, white = CASE_STYLES[number % len(CASE_STYLES)]
             label = title if len(loads) == 1 else f"{title}, {load}"
-            colour = style.tinted(style.STRUCTURE_COLOURS[name], white)
             curve = values.sel(structure=name).isel(case=number)
-            axes.plot(
-                path.values, curve, color=colour, lw=width, ls=dashes, label=label, zorder=order
-            )
+            look = curve_look(name, number)
+            axes.plot(path.values, curve, label=label, zorder=order, **look)
 
 
-def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Measure) -> None:
-    """Tells what the cloak should keep small, with the bands of the cloak's imperfect copies."""
+def measure_panel(
+    axes: Axes,
+    study: StudyResults,
+    path: Abscissa,
+    measure: Measure,
+    named: Collection[Line2D] = (),
+) -> None:
+    """Tells what the cloak should keep small, with the bands of the cloak's imperfect copies.
+
+    What is `named` in a legend outside of the panel is not in the panel's own.
+    """
     problem, response = study.problem, study.response
     path_axes(axes, path, measure.symbol)
     names = [name for name in structures(response) if name != "intact"]
@@ -98,7 +98,10 @@ def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Meas
         _bands(axes, study, path, measure, copied)
     measured.bands(axes, study, measure.key, names)
     measured.measured_curves(axes, study, path, measure.of, names)
-    legend = axes.legend(loc="upper left", handlelength=1.2)
+    outside = {entry.get_label() for entry in named}
+    drawn = zip(*axes.get_legend_handles_labels(), strict=True)
+    own = [handle for handle, label in drawn if label not in outside]
+    legend = axes.legend(handles=own, loc="upper left", handlelength=1.2)
     room = min(_LINE * len(legend.get_texts()), _MOST_ROOM)
     if vanishes:
         seen = values.sel(structure=names).isel(time=slice(1, None)).values

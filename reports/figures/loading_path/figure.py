@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pipeline.problem.sections import Paper, single_drives
 from reports.base import Table, prose, style
-from reports.facts import JUMPED, Fact
+from reports.facts import JUMPED, Fact, printed
 from reports.figures.loading_path import curves, measures, monte_carlo, tables
 from reports.figures.loading_path.abscissa import (
     LOADS,
@@ -20,6 +20,7 @@ from reports.figures.loading_path.abscissa import (
     structures,
 )
 from reports.figures.loading_path.drive_response import drive_response
+from reports.figures.loading_path.load_legend import LoadLegend
 from reports.figures.loading_path.snapshot_grid import SnapshotLayout, snapshots
 from reports.figures.loading_path.structure_panels import rest_panel, shade_of
 from reports.page import PageText, study_text
@@ -49,7 +50,8 @@ Curve = tuple[str, Callable[[Axes], None], str, Sequence[Table]]
 def loading_path_figure(study: StudyResults) -> PanelFigure:
     """Returns the whole figure."""
     problem, path = study.problem, abscissa_of(study.problem, study.response)
-    grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS)
+    legend = LoadLegend.of(study)
+    grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS - legend.height)
     top = 52.0
     low = top + grid.head + grid.lines * grid.side + 2.0
     colours = shade_of(problem, study.response).field.label.replace("u_y", "u<sub>y</sub>")
@@ -64,10 +66,10 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
             lambda figure: snapshots(figure, study, grid, top + grid.head),
             f"Snapshots at true size, coloured by {colours}.",
         ),
-        *_side_by_side(list(_curves(study, path)), low),
+        *_side_by_side(list(_curves(study, path, legend)), low, legend),
     ]
     remark = measured_overlay.caption(study.recordings, grid.recorded)
-    return PanelFigure(low + 48.0, panels, study.draft, remark)
+    return PanelFigure(low + 48.0 + legend.height, panels, study.draft, remark)
 
 
 def design_panels(
@@ -102,7 +104,7 @@ def _history(study: StudyResults) -> str:
 def _size(drive: Any) -> str:  # noqa: ANN401  (any drive that has an amplitude)
     """Tells the amplitude of a drive with its symbol and unit."""
     _, symbol, unit, factor = LOADS.get(drive.kind, ("", "$A$", drive.unit, 1.0))
-    return f"{symbol} = {factor * drive.amplitude:.4g} {unit}".replace(" °", "°")
+    return f"{symbol} = {printed(f'{factor * drive.amplitude:.4g}', unit)}".replace(" °", "°")
 
 
 def _at_rest(figure: Figure, study: StudyResults) -> Iterator[Axes]:
@@ -123,12 +125,16 @@ def _at_rest(figure: Figure, study: StudyResults) -> Iterator[Axes]:
         yield axes
 
 
-def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
+def _curves(study: StudyResults, path: Abscissa, legend: LoadLegend) -> Iterator[Curve]:
     """Titles, curves, sentences and tables of what stands below the snapshots, left to right."""
     problem, measure = study.problem, measures.measure_of(study.problem)
+
+    def of_measure(axes: Axes) -> None:
+        curves.measure_panel(axes, study, path, measure, legend.entries)
+
     way = [Table("path.csv", "every structure along the path", tables.path(study))]
     words = f"{measure.label}{measure.formula}{marks([study])}."
-    yield measure.label, lambda axes: curves.measure_panel(axes, study, path, measure), words, way
+    yield measure.label, of_measure, words, way
     lateral = path.static and measures.contracts_freely(problem, study.response)
     if lateral and problem.objective.target != "rest":
         panel = curves.contraction_panel
@@ -157,13 +163,16 @@ def _answer(study: StudyResults, path: Abscissa) -> Curve:
     return response.title, lambda axes: curves.drive_panel(axes, study, path), f"{words}.", ()
 
 
-def _side_by_side(shown: Sequence[Curve], top: float) -> Iterator[Panel]:
+def _side_by_side(shown: Sequence[Curve], top: float, legend: LoadLegend) -> Iterator[Panel]:
+    """Yields the curves; the first one draws the legend of all below them."""
     width = style.TWO_COLUMNS / len(shown)
     for k, (title, draw, words, data) in enumerate(shown):
         left = k * width
 
         def placed(figure: Figure, left: float = left, draw: Callable[[Axes], None] = draw) -> None:
             draw(style.place(figure, left + 11.0, top + 11.5, width - 14.0, 27.0))
+            if left == 0.0:
+                legend.draw(figure, top + 47.0)
 
         yield Panel(("defg"[k], title, left, top), placed, words, data)
 

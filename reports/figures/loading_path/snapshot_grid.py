@@ -2,9 +2,10 @@
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
+import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -86,7 +87,10 @@ class SnapshotLayout:
 
     @classmethod
     def of(cls, study: StudyResults, path: Abscissa, tallest: float) -> "SnapshotLayout":
-        """Returns the layout that shows them larger."""
+        """Returns the layout that shows them larger.
+
+        They are at most `tallest` (mm) together with all lines of their labels but the first.
+        """
         kinds, loads = rows(study), len(path.shown)
         across = style.TWO_COLUMNS - LABEL - BAR
 
@@ -94,7 +98,9 @@ class SnapshotLayout:
             return min(across / columns, tallest / lines, LARGEST)
 
         above, beside = side(loads, len(kinds)), side(len(kinds), loads)
-        return cls(kinds, path, max(above, beside), beside > above)
+        made = cls(kinds, path, max(above, beside), beside > above)
+        most = (tallest - (made.head - _HEAD)) / made.lines
+        return made if made.side <= most else replace(made, side=most)
 
     @property
     def lines(self) -> int:
@@ -212,5 +218,6 @@ def snapshot(
 def shade_bar(figure: Figure, shade: UnitColouring, place: tuple[float, float, float]) -> None:
     """Draws the bar of the snapshots, in `place`: mm from the left and the top, and height."""
     bar = colour_bar(figure, shade.norm, shade.colours, place, shade.label).ax
-    bar.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
+    most = int(np.clip(place[-1] / 3.5, 2, 8))  # numbers of a low bar would overlap
+    bar.yaxis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10]))
     bar.yaxis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "−"))

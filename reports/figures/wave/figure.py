@@ -11,13 +11,12 @@ from matplotlib.figure import Figure
 from reports.base import Table, prose, style
 from reports.facts import Columns, headed_columns
 from reports.figures.loading_path import (
-    TALLEST_SNAPSHOTS,
+    LoadLegend,
     SnapshotLayout,
     SnapshotStructure,
     abscissa_of,
     by_structure,
     design_panels,
-    load_names,
     marks,
     measure_panel,
     measures,
@@ -29,30 +28,34 @@ from reports.figures.loading_path import (
 from reports.figures.wave import contacts, edge_contacts
 from reports.figures.wave.monitored_places import MonitoredUnit, first_structure, places
 from reports.panels import Panel, PanelFigure, measured_overlay
-from reports.study import StudyResults, display_name
+from reports.study import StudyResults
 
 CONTACT = "#e3342f"
 """Colour of marks: of contacts, and of places, as in the paper."""
 ROOM = 8.5
 """Between the letter of a row and its panels, mm."""
-_LINE, _HANDLE, _LETTER = 3.4, 6.5, 1.1
-"""Of a legend above its panel, mm: height of a line, room of a handle, mean width of a letter."""
+TALLEST_SNAPSHOTS = 82.0
+"""Height that all snapshots may take on a page that has two rows of curves, mm."""
 _PROSE = prose(__file__)
 
 
 def wave_figure(study: StudyResults) -> PanelFigure:
     """Returns the whole figure."""
     path, half = abscissa_of(study.problem, study.response), style.TWO_COLUMNS / 2
-    lines = _legend_lines(study)
-    grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS - _LINE * lines)
+    legend = LoadLegend.of(study)
+    grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS - legend.height)
     top = 52.0
     middle = top + grid.head + grid.lines * grid.side + 1.5
-    first = middle + ROOM + _LINE * lines
-    low = middle + 44.0 + _LINE * lines
+    first = middle + ROOM + legend.height
+    low = middle + 44.0 + legend.height
 
     def error(figure: Figure) -> None:
         axes = style.place(figure, 11.0, low + ROOM, half - 14.0, 27.0)
-        measure_panel(axes, study, path, measures.measure_of(study.problem))
+        measure_panel(axes, study, path, measures.measure_of(study.problem), legend.entries)
+
+    def motions(figure: Figure) -> None:
+        legend.draw(figure, middle + ROOM - 1.5)
+        _places(figure, study, first, named=not legend.entries)
 
     panels = [
         *design_panels(study, _PROSE["a"], partial(_mark_places, study)),
@@ -65,7 +68,7 @@ def wave_figure(study: StudyResults) -> PanelFigure:
         ),
         Panel(
             ("d", "Vertical displacement where marked in a", 0.0, middle),
-            lambda figure: _places(figure, study, first, lines),
+            motions,
             _PROSE["d"],
             [Table("waves.csv", "every structure over time (panels d to f)", _over_time(study))],
         ),
@@ -103,22 +106,8 @@ def _contacts(study: StudyResults, axes: Axes, row: SnapshotStructure, sample: i
     axes.plot(x, y, ls="", marker="o", ms=2.4, mfc=CONTACT, mec="white", mew=0.3, zorder=8)
 
 
-def _legend_lines(study: StudyResults) -> int:
-    """Counts the lines of a legend above its panel; none where there is one load case.
-
-    Of one load case the few entries have room beside the curves.
-    """
-    shown, loads = structures(study.response), load_names(study.problem, study.response)
-    if len(loads) == 1:
-        return 0
-    names = [display_name(study.problem, name) for name in shown]
-    longest = max(map(len, names)) + len(", ") + max(map(len, loads))
-    across = int((style.TWO_COLUMNS - 14.0) // (_HANDLE + _LETTER * longest))
-    return -(-len(names) * len(loads) // max(across, 1))
-
-
-def _places(figure: Figure, study: StudyResults, top: float, lines: int) -> None:
-    """Draws u_y over time at each place, side by side; a legend of some lines above them."""
+def _places(figure: Figure, study: StudyResults, top: float, *, named: bool) -> None:
+    """Draws u_y over time at each place, side by side; curves are `named` in the first panel."""
     shown = places(study.problem, study.response)
     path = abscissa_of(study.problem, study.response)
     rise = study.response["displacement"].sel(dof="uy")
@@ -131,13 +120,7 @@ def _places(figure: Figure, study: StudyResults, top: float, lines: int) -> None
         reach = 1.25 * float(np.abs(curves).max())
         axes.set_ylim(-reach, reach)
         axes.plot(0.05, 0.9, transform=axes.transAxes, **_mark(place, 4.0))
-        if k == 0 and lines:
-            columns = -(-len(axes.get_legend_handles_labels()[1]) // lines)
-            axes.legend(
-                loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, columnspacing=1.2,
-                handlelength=1.2, borderaxespad=0.2,
-            )  # fmt: skip
-        elif k == 0:
+        if k == 0 and named:
             axes.legend(loc="lower left", handlelength=1.2, borderaxespad=0.2)
 
 

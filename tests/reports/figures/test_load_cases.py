@@ -19,15 +19,17 @@ from reports.figures.loading_path import (
     abscissa,
     curves,
     facts,
+    figure,
     measured,
     measures,
     monte_carlo,
     snapshot_grid,
+    structure_panels,
     tables,
 )
 from reports.figures.shielding import facts as shielding
 from reports.study import StudyResults, evaluation_count
-from tests.reports import recorded_study
+from tests.reports import figure_assertions, recorded_study
 from tests.reports.compressed_study import SHIELD, written
 from tests.tables import cases
 
@@ -131,18 +133,42 @@ def test_two_sides_that_are_pressed_have_no_strain_by_one() -> None:
     assert not list(facts.strain_facts(asked.model_copy(update={"drive": both}), PATH))
 
 
-def test_curves_of_many_cases_stay_on_their_panel(two: StudyResults) -> None:
-    """However long the legend is: of ten entries none was left for them."""
-    asked, response = two.problem, two.response
-    more = xr.concat([response] * 3, "case", data_vars="minimal", coords="minimal")
-    ways = tuple(np.linspace(0.0, np.pi, 6))
+@pytest.mark.parametrize("count", [2, 4])
+def test_a_legend_of_several_loads_is_below_all_curves(two: StudyResults, count: int) -> None:
+    """It names every curve once, and leaves to a panel what is in that one alone."""
+    with style.styled():
+        made = figure_assertions.drawn(figure.loading_path_figure(in_many(two, count)).draw())
+    figure_assertions.assert_legible(made)
+    (legend,) = made.legends
+    names = [text.get_text() for text in legend.get_texts()]
+    assert len(set(names)) == len(names) == 2 * count
+    below = min(box.y0 for axes in made.axes if (box := axes.get_tightbbox()) is not None)
+    assert 0.0 <= legend.get_window_extent().y0 < legend.get_window_extent().y1 <= below
+    axes = next(axes for axes in made.axes if axes.get_ylabel().startswith("Mean"))
+    own = axes.get_legend()
+    assert own is not None
+    kept = {text.get_text() for text in own.get_texts()}
+    assert "Unloaded: zero" in kept
+    assert not kept & set(names)
+
+
+def in_many(study: StudyResults, count: int) -> StudyResults:
+    """The study of two loads with so many of them, each pair the same again."""
+    asked, response = study.problem, study.response
+    more = xr.concat([response] * (count // 2), "case", data_vars="minimal", coords="minimal")
+    ways = tuple(np.radians(more["direction"].values))
     drive = asked.drive.model_copy(update={"directions": ways, "weights": None})
     datasets: dict[Output, xr.Dataset] = {
-        "design": two.design,
+        "design": study.design,
         "response": more.assign_attrs(response.attrs),
     }
     posed = asked.model_copy(update={"drive": drive})
-    many = replace(two, problem=posed, datasets=datasets)
+    return replace(study, problem=posed, datasets=datasets)
+
+
+def test_curves_of_many_cases_stay_on_their_panel(two: StudyResults) -> None:
+    """However long the legend is: of ten entries none was left for them."""
+    many = in_many(two, 6)
     path = abscissa.abscissa_of(many.problem, many.response)
     made = Figure()
     curves.measure_panel(made.add_subplot(), many, path, measures.measure_of(many.problem))
@@ -150,6 +176,24 @@ def test_curves_of_many_cases_stay_on_their_panel(two: StudyResults) -> None:
     drawn = [np.asarray(line.get_ydata(), dtype=float) for line in made.axes[0].get_lines()]
     most = max(float(np.nanmax(curve)) for curve in drawn if curve.size)
     assert low <= 0.0 < most < high
+
+
+def test_zero_has_no_sign_on_a_path_to_the_left() -> None:
+    path = replace(PATH, values=np.array([0.0, -15.0]), strain=0.1)
+    assert [path.at(0), path.at(1)] == ["0 mm (0 %)", "−15 mm (10 %)"]
+    made = Figure()
+    curves.path_axes(made.add_subplot(), path, "")
+    (above,) = made.axes[0].child_axes
+    made.draw_without_rendering()
+    assert [tick.get_text() for tick in above.get_xticklabels()] == ["0", "10"]
+
+
+def test_numbers_of_a_low_bar_of_colours_do_not_overlap(two: StudyResults) -> None:
+    """Beside a single row of snapshots that are small."""
+    shade = structure_panels.shade_of(two.problem, two.response)
+    with style.styled():
+        snapshot_grid.shade_bar(made := style.page(60.0), shade, (150.0, 10.0, 17.0))
+        figure_assertions.assert_legible(figure_assertions.drawn(made))
 
 
 def test_equal_loads_are_numbered_and_a_clockwise_turn_ascends(

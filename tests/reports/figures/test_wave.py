@@ -144,18 +144,19 @@ def test_graded_steps_are_told_in_words(length: float, told: str) -> None:
     assert {fact.note for fact in found} == {f"relative error 0.2; {told}; none overlap"}
 
 
-@pytest.mark.parametrize("degrees", [[90.0], [90.0, 0.0, 270.0], [180.0, 180.0]])
-def test_a_legend_of_several_loads_covers_no_curve(
-    smile: StudyResults, degrees: list[float]
-) -> None:
-    """It stands between the title and the curves, on the page; of alike loads it is longest."""
+@pytest.mark.parametrize("degrees", [[], [90.0], [90.0, 0.0, 270.0], [180.0, 180.0]])
+def test_the_figure_of_several_loads_fits_a_page(smile: StudyResults, degrees: list[float]) -> None:
+    """The legend stands between title and curves, and is for all panels; of alike loads longest."""
+    study = in_cases(smile, degrees) if degrees else smile
     with style.styled():
-        made = figure_assertions.drawn(figure.wave_figure(in_cases(smile, degrees)).draw())
+        made = figure_assertions.drawn(figure.wave_figure(study).draw())
+    figure_assertions.assert_legible(made)
+    assert len(made.legends) == bool(degrees)
     axes = next(axes for axes in made.axes if axes.get_ylabel() == "$u_y$ (mm)" and axes.lines)
-    legend = axes.get_legend()
-    assert legend is not None
-    box = legend.get_window_extent()
-    assert axes.get_window_extent().y1 <= box.y0
-    assert made.bbox.x0 <= box.x0 < box.x1 <= made.bbox.x1
-    titles = [text for text in made.texts if text.get_text().startswith("Vertical displacement")]
-    assert box.y1 <= titles[0].get_window_extent().y0
+    for legend in made.legends:
+        box = legend.get_window_extent()
+        assert axes.get_window_extent().y1 <= box.y0
+        assert made.bbox.x0 <= box.x0 < box.x1 <= made.bbox.x1
+        titles = [text for text in made.texts if text.get_text().startswith("Vertical")]
+        assert box.y1 <= titles[0].get_window_extent().y0
+        assert len(legend.get_texts()) == 3 * (1 + len(degrees))
