@@ -1,4 +1,6 @@
 from . import style as style
+from .axis_numbers import scale_wide_numbers as scale_wide_numbers
+from .axis_numbers import typeset as typeset
 from .csv_table import Table as Table
 from .page_prose import prose as prose
 from .style import ALTERED as ALTERED

@@ -24,6 +24,7 @@ from matplotlib.font_manager import fontManager
 from matplotlib.text import Annotation
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from reports.base.axis_numbers import DECADES, is_power, typeset
 from sim.core import Floats
 
 LOG = logging.getLogger(__name__)
@@ -211,7 +212,8 @@ def log_values(axes: Axes) -> None:
 
     def number(value: float, _: float) -> str:
         low, high = axes.get_ylim()
-        return "" if high > 1e3 * low and not f"{value:.0e}".startswith("1e") else f"{value:g}"
+        named = high <= DECADES * low or is_power(value)
+        return typeset(f"{value:g}").removeprefix("1 × ") if named else ""
 
     axes.set_yscale("log", nonpositive="mask")
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))

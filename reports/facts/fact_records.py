@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pipeline.problem.sections import Paper
 from pipeline.runtime import UserError
-from reports.base import Table, prose
+from reports.base import Table, prose, typeset
 
 ABSENT = "—"
 
@@ -110,14 +110,7 @@ def worded(value: float, unit: str, digits: int) -> str:
 
 def printed(text: str, unit: str) -> str:
     """Sets a number that Python has written, with its unit: powers of ten, minus sign."""
-    if "e" in text:
-        mantissa, exponent = text.split("e")
-        text = f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}"
-    text = text.replace("-", "−")
-    return text + {"1": "", "deg": "°"}.get(unit, f" {unit}")
-
-
-_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+    return typeset(text) + {"1": "", "deg": "°"}.get(unit, f" {unit}")
 
 
 def percent(value: float) -> str:

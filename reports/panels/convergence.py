@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 
 from pipeline.posing import FEASIBLE
-from reports.base import style
+from reports.base import style, typeset
 
 SIDES: tuple[tuple[tuple[float, float], dict[str, Any]], ...] = (
     ((0, -4.5), {"ha": "right", "va": "top"}),
@@ -74,8 +74,9 @@ def _name_best(axes: Axes, history: xr.Dataset) -> None:
     """Writes the best loss beside its mark, on the first side that crosses the least of curves."""
     at, best = int(history["best_evaluation"]), float(history["best_loss"])
     colour = style.METHOD_COLOURS.get(str(history["method"].values), style.GREY)
+    number = typeset(f"{best:.3g}")
     written = [
-        style.note(axes, (at, best), f"{best:.3g}", shift, color=colour, zorder=7, **corner)
+        style.note(axes, (at, best), number, shift, color=colour, zorder=7, **corner)
         for shift, corner in SIDES
     ]
     crossed = [_crossed(axes, label.get_window_extent()) for label in written]

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.problem.sections import Paper, single_drives
-from reports.base import Table, prose, style
+from reports.base import Table, prose, scale_wide_numbers, style
 from reports.facts import JUMPED, Fact, printed
 from reports.figures.loading_path import curves, measures, monte_carlo, tables
 from reports.figures.loading_path.abscissa import (
@@ -83,7 +83,9 @@ def design_panels(
                 overlay(axes)
 
     def optimisation(figure: Figure) -> None:
-        loss_history(style.place(figure, 133.5, 8.5, 43.5, 31.5), study.design)
+        axes = style.place(figure, 133.5, 8.5, 43.5, 31.5)
+        loss_history(axes, study.design)
+        scale_wide_numbers(axes)
 
     design, history = tables.of_design(study)
     return [
@@ -170,7 +172,10 @@ def _side_by_side(shown: Sequence[Curve], top: float, legend: LoadLegend) -> Ite
         left = k * width
 
         def placed(figure: Figure, left: float = left, draw: Callable[[Axes], None] = draw) -> None:
+            before = len(figure.axes)
             draw(style.place(figure, left + 11.0, top + 11.5, width - 14.0, 27.0))
+            for axes in figure.axes[before:]:  # and the one on the right
+                scale_wide_numbers(axes)
             if left == 0.0:
                 legend.draw(figure, top + 47.0)
 

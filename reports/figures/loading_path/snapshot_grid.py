@@ -13,7 +13,7 @@ from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator
 
 from pipeline.problem import Problem
-from reports.base import style
+from reports.base import scale_wide_numbers, style, typeset
 from reports.figures.loading_path.abscissa import (
     SECOND,
     Abscissa,
@@ -157,6 +157,12 @@ def _wrapped(text: str, room: float) -> str:
     return "\n".join(lines)
 
 
+def _size(text: str, room: float) -> float:
+    """Chooses the size of a label: small if it has several lines, or is longer than so many mm."""
+    fits = "\n" not in text and _length(text, style.TEXT) <= room
+    return style.TEXT if fits else style.SMALL
+
+
 @lru_cache(maxsize=1024)
 def _length(text: str, size: float) -> float:
     """Measures a line of text in points, mm: by its outline, for which lines come again."""
@@ -197,11 +203,12 @@ def _labels(
         x = grid.left + (k + 0.5) * grid.side - GAP / 2
         style.write(
             figure, x, top - 0.8, text, ha="center", va="bottom", color=colour,
-            fontsize=style.SMALL if "\n" in text else style.TEXT, multialignment="center",
+            fontsize=_size(text, grid.side - GAP), multialignment="center",
         )  # fmt: skip
     for k, (text, colour) in enumerate(left):
         y = top + (k + 0.5) * grid.side - GAP / 2
-        size, off = (style.SMALL, 0.5) if "\n" in text else (style.TEXT, 1.5)
+        off = 0.5 if "\n" in text else 1.5
+        size = _size(text, grid.side - GAP)
         style.write_upwards(figure, grid.left - off, y, text, color=colour, fontsize=size)
 
 
@@ -220,4 +227,5 @@ def shade_bar(figure: Figure, shade: UnitColouring, place: tuple[float, float, f
     bar = colour_bar(figure, shade.norm, shade.colours, place, shade.label).ax
     most = int(np.clip(place[-1] / 3.5, 2, 8))  # numbers of a low bar would overlap
     bar.yaxis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10]))
-    bar.yaxis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "−"))
+    bar.yaxis.set_major_formatter(lambda value, _: typeset(f"{value:g}"))
+    scale_wide_numbers(bar)

@@ -6,7 +6,7 @@ from itertools import count
 
 from matplotlib.figure import Figure
 
-from reports.base import prose, style
+from reports.base import prose, scale_wide_numbers, style
 from reports.figures import loading_path
 from reports.figures.loading_path import (
     UnitColouring,
@@ -130,6 +130,7 @@ def _curves(
                 curves.measure_panel(axes, study, way, measure)
             else:
                 curves.contraction_panel(axes, study, way)
+            scale_wide_numbers(axes)
 
         head = next(letters), f"{style.literal(heading(study))}, {title.lower()}", left, y
         yield Panel(head, draw, _PROSE[("measure", "contraction")[half]].format_map(words))

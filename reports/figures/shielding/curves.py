@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
-from reports.base import style
+from reports.base import scale_wide_numbers, style
 from reports.facts import measures, percent
 from reports.figures.shielding.facts import monitored, paper_loss
 from reports.figures.shielding.structure_panels import SnapshotRow
@@ -22,6 +22,7 @@ def loss_panel(axes: Axes, design: xr.Dataset, quoted: bool) -> None:
     loss_history(axes, design)
     if quoted:
         _paper_line(axes, design)
+    scale_wide_numbers(axes)
 
 
 def _paper_line(axes: Axes, design: xr.Dataset) -> None:

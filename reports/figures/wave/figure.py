@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reports.base import Table, prose, style
+from reports.base import Table, prose, scale_wide_numbers, style
 from reports.facts import Columns, headed_columns
 from reports.figures.loading_path import (
     LoadLegend,
@@ -52,6 +52,7 @@ def wave_figure(study: StudyResults) -> PanelFigure:
     def error(figure: Figure) -> None:
         axes = style.place(figure, 11.0, low + ROOM, half - 14.0, 27.0)
         measure_panel(axes, study, path, measures.measure_of(study.problem), legend.entries)
+        scale_wide_numbers(axes)
 
     def motions(figure: Figure) -> None:
         legend.draw(figure, middle + ROOM - 1.5)
@@ -120,6 +121,7 @@ def _places(figure: Figure, study: StudyResults, top: float, *, named: bool) -> 
         reach = 1.25 * float(np.abs(curves).max())
         axes.set_ylim(-reach, reach)
         axes.plot(0.05, 0.9, transform=axes.transAxes, **_mark(place, 4.0))
+        scale_wide_numbers(axes)
         if k == 0 and named:
             axes.legend(loc="lower left", handlelength=1.2, borderaxespad=0.2)
 
@@ -140,6 +142,7 @@ def _edges(axes: Axes, study: StudyResults) -> None:
         0.01, end + 0.5 * (begins - end), "contact", color=CONTACT, fontsize=style.SMALL,
         va="center", transform=axes.get_yaxis_transform(),
     )  # fmt: skip
+    scale_wide_numbers(axes)
 
 
 def _over_time(study: StudyResults) -> Columns:

@@ -173,7 +173,7 @@ def test_a_smooth_ramp_begins_at_zero_and_its_loads_are_not_equally_spaced(
     assert path.at(-1) == "15 mm (10 %)"
     assert path.at(1) == "0.00185 mm (0.0012 %)"
     wave = dataclasses.replace(path, static=False, strain=None, unit="s")
-    assert wave.at(0) == "9.22e-05 s"
+    assert wave.at(0) == "9.22 × 10⁻⁵ s"
     drive = TanhRampDrive.model_construct(
         kind="tanh_ramp", units="right", amplitude=amplitude, directions=(np.pi,), duration=1.0
     )
@@ -254,6 +254,23 @@ def test_facts_tell_of_load_steps(smile: StudyResults) -> None:
 @pytest.mark.parametrize("name", some(["smile", "shield"], 1))
 def test_the_figure_is_legible(name: str, request: pytest.FixtureRequest) -> None:
     figure_assertions.assert_legible(made(request.getfixturevalue(name)))
+
+
+@pytest.mark.parametrize("name", some(["smile", "shield"], 1))
+@pytest.mark.parametrize("factor", [1e-4, 1e5])
+def test_the_figure_is_legible_of_very_small_and_large_loads(
+    name: str, factor: float, request: pytest.FixtureRequest
+) -> None:
+    """Motions are small too, of which wide numbers would push labels off the page."""
+    study = request.getfixturevalue(name)
+    factors = {"reaction_force": factor, "eigenvalue": factor}
+    factors |= dict.fromkeys(("displacement", "drive_displacement"), min(factor, 1.0))
+    response = study.response.assign({key: by * study.response[key] for key, by in factors.items()})
+    losses = ("loss", "loss_case", "best_loss")
+    design = study.design.assign({key: factor * study.design[key] for key in losses})
+    figure_assertions.assert_legible(
+        made(changed(changed(study, "response", response), "design", design))
+    )
 
 
 def test_the_figure_names_structures_units_and_the_papers_label(shield: StudyResults) -> None:
