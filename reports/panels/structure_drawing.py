@@ -5,6 +5,7 @@ from typing import Any, Literal
 
 import matplotlib.patheffects as effects
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
@@ -12,7 +13,7 @@ from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
+from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
 
 from reports.base import GREY, INTACT, PALE, style
 from reports.study import CLAMPED, RigidUnits, deformed
@@ -94,11 +95,26 @@ def colour_bar(
 
 
 def draw_clamps(axes: Axes, structure: RigidUnits, pad: float) -> None:
-    """Draws hatched pad of `pad` mm under every clamped unit."""
-    for x, y in structure.centroid[structure.support == CLAMPED]:
-        look: dict[str, Any] = {"facecolor": "white", "edgecolor": INTACT, "hatch": "/" * 6}
-        corner = (x - pad / 2, y - pad / 2)
-        axes.add_patch(Rectangle(corner, pad, pad, linewidth=0.4, zorder=1, **look))
+    """Draws hatched pad of `pad` mm under every clamped unit; pads that overlap are joined."""
+    look: dict[str, Any] = {"facecolor": "white", "edgecolor": INTACT, "hatch": "/" * 6}
+    look |= {"linewidth": 0.4, "zorder": 1}
+    corners = structure.centroid[structure.support == CLAMPED] - pad / 2
+    if not _overlap(corners, pad):
+        for x, y in corners:
+            axes.add_patch(Rectangle((x, y), pad, pad, **look))
+        return
+    joined = shapely.union_all(shapely.box(*corners.T, *(corners + pad).T))
+    for reach in (0.1 * pad, -0.1 * pad):  # closes slits between them
+        joined = joined.buffer(reach, join_style="mitre")
+    for part in shapely.get_parts(joined):
+        axes.add_patch(Polygon(shapely.get_coordinates(part.exterior), **look))
+
+
+def _overlap(corners: Floats, side: float) -> bool:
+    """Tests if any two squares overlap by more than their edges, by their corners (n, 2)."""
+    apart = np.abs(corners[:, None] - corners).max(axis=-1)
+    np.fill_diagonal(apart, np.inf)
+    return bool((apart < 0.99 * side).any())
 
 
 def outline(axes: Axes, centre: Floats, radii: Iterable[float], colour: str) -> None:
