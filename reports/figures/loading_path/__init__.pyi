@@ -12,6 +12,7 @@ from .curves import path_axes as path_axes
 from .curves import structure_curves as structure_curves
 from .facts import loss_facts as loss_facts
 from .facts import scene_facts as scene_facts
+from .figure import arrows_in_words as arrows_in_words
 from .figure import axis as axis
 from .figure import credit as credit
 from .figure import design_panels as design_panels

@@ -56,6 +56,7 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
     low = top + grid.head + grid.lines * grid.side + 2.0
     colours = shade_of(problem, study.response).field.label.replace("u_y", "u<sub>y</sub>")
     clamped = _PROSE["rest"].format(
+        turns=arrows_in_words(study),
         stiffened=_PROSE["stiffened"] if problem.inclusion is not None else "",
         interest=_PROSE["interest"] if problem.objective.region != "surroundings" else "",
     )
@@ -145,7 +146,7 @@ def _curves(study: StudyResults, path: Abscissa, legend: LoadLegend) -> Iterator
     yield _answer(study, path)
     if (copies := study.scatter) is not None:
         end = " at the end of the path" if path.static else ""
-        words = _PROSE["copies"].format(end=end, **_noises([copies]))
+        words = _PROSE["copies"].format(end=end, mean=_mean([study]), **_noises([copies]))
         told = "imperfect copies, one a line"
         table = Table("robustness.csv", told, tables.copies(study, copies))
         title = f"{copies['sample'].size} imperfect cloaks"
@@ -158,8 +159,9 @@ def _answer(study: StudyResults, path: Abscissa) -> Curve:
     response = drive_response(study.problem)
     words = _PROSE[response.key]
     if response.held and path.static and "intact" in structures(study.response):
-        words += _PROSE["reaction_error"]
-    words += _PROSE["eigenvalue"] if path.static else ""
+        words += _PROSE["reaction_error"].format(mean=_mean([study]))
+    if path.static:
+        words += _PROSE["eigenvalue"].format(least=_PROSE["least"] * bool(_mean([study])))
     if path.displaces and np.isfinite(study.response["snap_load"]).any():
         words += _PROSE["snaps"]
     return response.title, lambda axes: curves.drive_panel(axes, study, path), f"{words}.", ()
@@ -189,7 +191,20 @@ def marks(studies: Sequence[StudyResults]) -> str:
     jumps = any((study.response["stability"] >= JUMPED).any() for study in studies)
     second = any(study.redesign is not None and study.redesign.changed for study in studies)
     shown = {"bands": banded["drawn"], "jumps": jumps, "second": second}
-    return "".join(_PROSE[name].format_map(banded) for name, there in shown.items() if there)
+    words = banded | {"mean": _mean(studies)}
+    return "".join(_PROSE[name].format_map(words) for name, there in shown.items() if there)
+
+
+def arrows_in_words(study: StudyResults) -> str:
+    """Tells that the directions of a single drive are driven one after another, if several are."""
+    alone = len(single_drives(study.problem.drive)) == 1
+    return str(_PROSE["turns"]) if alone and _mean([study]) else ""
+
+
+def _mean(studies: Sequence[StudyResults]) -> str:
+    """Tells of what is not drawn by load case that it is a mean; nothing of one load case."""
+    several = any(study.response.sizes["case"] > 1 for study in studies)
+    return str(_PROSE["mean"]) if several else ""
 
 
 def _noises(made: Sequence[xr.Dataset]) -> dict[str, str]:

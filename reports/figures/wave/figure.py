@@ -15,6 +15,7 @@ from reports.figures.loading_path import (
     SnapshotLayout,
     SnapshotStructure,
     abscissa_of,
+    arrows_in_words,
     by_structure,
     design_panels,
     marks,
@@ -59,7 +60,9 @@ def wave_figure(study: StudyResults) -> PanelFigure:
         _places(figure, study, first, named=not legend.entries)
 
     panels = [
-        *design_panels(study, _PROSE["a"], partial(_mark_places, study)),
+        *design_panels(
+            study, _PROSE["a"].format(turns=arrows_in_words(study)), partial(_mark_places, study)
+        ),
         Panel(
             ("c", "Response, true to scale; red dots: contacts", 0.0, top),
             lambda figure: snapshots(

@@ -152,6 +152,33 @@ def test_a_legend_of_several_loads_is_below_all_curves(two: StudyResults, count:
     assert not kept & set(names)
 
 
+def test_what_is_not_drawn_by_load_case_is_told(two: StudyResults, shield: StudyResults) -> None:
+    scatter = shield.scatter
+    assert scatter is not None
+    departure = xr.concat([scatter["departure"]] * 2, "case")
+    datasets = two.datasets | {
+        "scatter": scatter.drop_vars("departure").assign(departure=departure)
+    }
+    told = figure.loading_path_figure(replace(two, datasets=datasets)).caption
+    mean = " (weighted mean over the load cases)"
+    assert f"hold 90 % of the imperfect cloaks{mean}, each of one kind" in told
+    assert f"at the end of the path{mean} over imperfect cloaks" in told
+    assert "drive, the least of all load cases: where it vanishes" in told
+    assert "along the arrows (each direction a load case)" in told
+    alone = figure.loading_path_figure(shield).caption
+    assert not any(words in alone for words in (mean, "the least of all", "each direction"))
+
+
+def test_the_eigenvalue_vanishes_where_that_of_one_case_does(two: StudyResults) -> None:
+    response = two.response.copy(deep=True)
+    response["eigenvalue"][:, 1, -1] = 0.0
+    study = replace(two, datasets=two.datasets | {"response": response})
+    axes = (made := Figure()).add_subplot()
+    curves.drive_panel(axes, study, abscissa.abscissa_of(study.problem, response))
+    ends = [np.asarray(line.get_ydata(), dtype=float)[-1] for line in made.axes[1].lines]
+    assert ends == [0.0, 0.0]
+
+
 def in_many(study: StudyResults, count: int) -> StudyResults:
     """The study of two loads with so many of them, each pair the same again."""
     asked, response = study.problem, study.response
