@@ -1,8 +1,12 @@
 """Draws and measures studies along a loading path, for tests."""
 
+import dataclasses
+
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 
+from pipeline.problem import Output
 from reports.base import style
 from reports.facts import fact_records
 from reports.figures.loading_path import facts as path_facts
@@ -15,6 +19,11 @@ def made(study: StudyResults) -> Figure:
     """Draws the figure of a study along its loading path."""
     with style.styled():
         return figure_assertions.drawn(figure.loading_path_figure(study).draw())
+
+
+def changed(study: StudyResults, name: Output, made: xr.Dataset) -> StudyResults:
+    """Returns a study with another dataset of a kind."""
+    return dataclasses.replace(study, datasets={**study.datasets, name: made})
 
 
 def values(study: StudyResults) -> dict[str, fact_records.Fact]:
