@@ -53,7 +53,7 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
     legend = LoadLegend.of(study)
     grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS - legend.height)
     top = 52.0
-    low = top + grid.head + grid.lines * grid.side + 2.0
+    low = top + grid.head + grid.lines * grid.height + 2.0
     colours = shade_of(problem, study.response).field.label.replace("u_y", "u<sub>y</sub>")
     clamped = _PROSE["rest"].format(
         turns=arrows_in_words(study),

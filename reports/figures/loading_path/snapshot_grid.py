@@ -13,6 +13,7 @@ from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator
 
 from pipeline.problem import Problem
+from pipeline.problem.sections import Lattice
 from reports.base import scale_wide_numbers, style, typeset
 from reports.figures.loading_path.abscissa import (
     SECOND,
@@ -28,7 +29,11 @@ from reports.study import StudyResults, display_name, from_dataset
 LABEL, BAR, GAP = 6.0, 14.0, 1.2
 """Room for labels left of snapshots and for the bar of colours, and between snapshots; mm."""
 LARGEST = 44.0
-"""Side of a snapshot where there is room, mm."""
+"""Longer side of a snapshot where there is room, mm."""
+_SLIMMEST = 0.45
+"""Least ratio of the sides of a snapshot, so that there is room for labels."""
+_NEARLY_SQUARE = 0.8
+"""Ratio of a lattice's sides above which its snapshots are square."""
 
 _HEAD, _LINE = 8.5, 3.0
 """Room above snapshots whose labels are of one line, and for each other one, mm."""
@@ -82,7 +87,8 @@ class SnapshotLayout:
 
     rows: list[SnapshotStructure]
     path: Abscissa
-    side: float
+    width: float
+    height: float
     beside: bool
 
     @classmethod
@@ -94,13 +100,17 @@ class SnapshotLayout:
         kinds, loads = rows(study), len(path.shown)
         across = style.TWO_COLUMNS - LABEL - BAR
 
-        def side(columns: int, lines: int) -> float:
-            return min(across / columns, tallest / lines, LARGEST)
+        slim = _slenderness(study.problem.lattice)
+        largest = LARGEST * min(1.0, 1.0 / slim)
 
-        above, beside = side(loads, len(kinds)), side(len(kinds), loads)
-        made = cls(kinds, path, max(above, beside), beside > above)
-        most = (tallest - (made.head - _HEAD)) / made.lines
-        return made if made.side <= most else replace(made, side=most)
+        def width(columns: int, lines: int) -> float:
+            return min(across / columns, tallest / lines / slim, largest)
+
+        above, beside = width(loads, len(kinds)), width(len(kinds), loads)
+        most = max(above, beside)
+        made = cls(kinds, path, most, slim * most, beside > above)
+        room = (tallest - (made.head - _HEAD)) / made.lines
+        return made if made.height <= room else replace(made, width=room / slim, height=room)
 
     @property
     def lines(self) -> int:
@@ -120,15 +130,17 @@ class SnapshotLayout:
     @property
     def left(self) -> float:
         """Tells where the snapshots begin so that all of them are in the middle."""
-        return LABEL + (style.TWO_COLUMNS - LABEL - BAR - self.columns * self.side) / 2
+        return LABEL + (style.TWO_COLUMNS - LABEL - BAR - self.columns * self.width) / 2
 
     @cached_property
     def labels(self) -> tuple[list[Label], list[Label]]:
         """Lists the labels above and left of the snapshots, each no longer than one of these."""
-        path, room = self.path, self.side - GAP
-        kinds = [(_wrapped(row.label, room), row.colour) for row in self.rows]
+        path = self.path
+        along, across = self.width - GAP, self.height - GAP
+        of_kinds, of_loads = (along, across) if self.beside else (across, along)
+        kinds = [(_wrapped(row.label, of_kinds), row.colour) for row in self.rows]
         loads = (f"{path.symbol} = {path.at(sample)}" for sample in path.shown)
-        values = [(_wrapped(load, room), style.INTACT) for load in loads]
+        values = [(_wrapped(load, of_loads), style.INTACT) for load in loads]
         return (kinds, values) if self.beside else (values, kinds)
 
     @property
@@ -139,6 +151,13 @@ class SnapshotLayout:
     def at(self, row: int, load: int) -> tuple[int, int]:
         """Returns line and column of a snapshot."""
         return (load, row) if self.beside else (row, load)
+
+
+def _slenderness(lattice: Lattice) -> float:
+    """Returns height over width of the snapshots of a lattice: one if these are nearly equal."""
+    extent = np.ptp([site[1:] for site in lattice.sites()], axis=0) + lattice.spacing
+    slim = float(np.clip(extent[1] / extent[0], _SLIMMEST, 1.0 / _SLIMMEST))
+    return 1.0 if _NEARLY_SQUARE < slim < 1.0 / _NEARLY_SQUARE else slim
 
 
 def _wrapped(text: str, room: float) -> str:
@@ -181,34 +200,34 @@ def snapshots(
     overlay: Overlay | None = None,
 ) -> None:
     """Draws all structures at all loads shown, from ``top`` (mm) on, an ``overlay`` on each."""
-    shade, side = shade_of(study.problem, study.response), grid.side
+    shade, wide, tall = shade_of(study.problem, study.response), grid.width, grid.height
     for k, row in enumerate(grid.rows):
         for m, sample in enumerate(grid.path.shown):
             line, column = grid.at(k, m)
             axes = style.place(
-                figure, grid.left + column * side, top + line * side, side - GAP, side - GAP
+                figure, grid.left + column * wide, top + line * tall, wide - GAP, tall - GAP
             )
             snapshot(axes, study.problem, row.part, sample, shade, row.case)
             if overlay is not None:
                 overlay(axes, row, sample)
     _labels(figure, grid, top, *grid.labels)
-    end = grid.left + grid.columns * side
-    shade_bar(figure, shade, (end + 1.5, top, grid.lines * side - GAP))
+    end = grid.left + grid.columns * wide
+    shade_bar(figure, shade, (end + 1.5, top, grid.lines * tall - GAP))
 
 
 def _labels(
     figure: Figure, grid: SnapshotLayout, top: float, above: Sequence[Label], left: Sequence[Label]
 ) -> None:
     for k, (text, colour) in enumerate(above):
-        x = grid.left + (k + 0.5) * grid.side - GAP / 2
+        x = grid.left + (k + 0.5) * grid.width - GAP / 2
         style.write(
             figure, x, top - 0.8, text, ha="center", va="bottom", color=colour,
-            fontsize=_size(text, grid.side - GAP), multialignment="center",
+            fontsize=_size(text, grid.width - GAP), multialignment="center",
         )  # fmt: skip
     for k, (text, colour) in enumerate(left):
-        y = top + (k + 0.5) * grid.side - GAP / 2
+        y = top + (k + 0.5) * grid.height - GAP / 2
         off = 0.5 if "\n" in text else 1.5
-        size = _size(text, grid.side - GAP)
+        size = _size(text, grid.height - GAP)
         style.write_upwards(figure, grid.left - off, y, text, color=colour, fontsize=size)
 
 

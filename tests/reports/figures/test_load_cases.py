@@ -116,6 +116,27 @@ def test_snapshots_of_many_recordings_are_told_apart(two: StudyResults, tmp_path
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
 
 
+@pytest.mark.parametrize(
+    ("columns", "rows", "wide"), [(15, 15, False), (40, 10, True), (10, 40, False)]
+)
+def test_snapshots_of_a_long_lattice_are_as_long(
+    smile: StudyResults, columns: int, rows: int, wide: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In squares they would be small, and most of the page white."""
+    size = {"columns": columns, "rows": rows}
+    lattice = smile.problem.lattice.model_copy(update=size)
+    posed = replace(smile, problem=smile.problem.model_copy(update={"lattice": lattice}))
+    path = abscissa.abscissa_of(smile.problem, smile.response)
+    drawn = snapshot_grid.rows(smile)
+    monkeypatch.setattr(snapshot_grid, "rows", lambda _: drawn)
+    grid = snapshot_grid.SnapshotLayout.of(posed, path, 80.0)
+    assert (grid.width > grid.height) == wide
+    assert (grid.width == grid.height) == (columns == rows)
+    assert grid.lines * grid.height <= 80.0 + 1e-9
+    square = snapshot_grid.SnapshotLayout.of(smile, path, 80.0)
+    assert max(grid.width, grid.height) > 0.9 * square.width
+
+
 @cases("reports", "degrees, labels")
 def test_a_drive_of_the_right_edge_is_named(degrees: tuple[float, ...], labels: list[str]) -> None:
     """The kind of strain, by the direction of the drive and its side."""
