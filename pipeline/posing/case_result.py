@@ -36,6 +36,8 @@ from sim.structure import clearance
 
 CLEARANCE_STRIDE = 4
 """Gaps and overlaps of a motion in time are looked for in every so many samples."""
+TICKS = 1e8
+"""Parts of a horizon that times of the output are told apart by, at least."""
 NOT_ASKED, UNSTABLE, STABLE = -1, 0, 1
 """Stability of a state: no equilibrium; no minimum of the energy; a minimum. More by
 ``LIMIT_POINT`` or ``BRANCHING`` is a minimum that it came to from where its path ended."""
@@ -263,7 +265,7 @@ def _at_rest(scene: Scene, vertices: Floats, angles: Floats) -> PosedStructure:
 
 
 def times_of(asked: Problem, scene: Scene) -> Times:
-    """Merges the output times of a problem's response."""
+    """Merges the output times of a problem's response, those that are alike but for rounding."""
     horizon = scene.loads.duration
     end = horizon if scene.loads.static else asked.response_time  # a path may be cut short
     shown = np.linspace(0.0, end, asked.response.samples)
@@ -272,10 +274,11 @@ def times_of(asked: Problem, scene: Scene) -> Times:
         integrated if scene.objective.steps else np.linspace(0.0, horizon, asked.horizon.samples)
     )
     wanted = (shown, integrated, sampled)
-    nanoseconds = [np.round(times * 1e9).astype(np.int64) for times in wanted]
-    every, place = np.unique(np.concatenate(nanoseconds), return_inverse=True)
+    rate, tick = max(1e9, TICKS / horizon), min(1e-9, horizon / TICKS)
+    ticks = [np.round(times * rate).astype(np.int64) for times in wanted]
+    every, place = np.unique(np.concatenate(ticks), return_inverse=True)
     ends = np.cumsum([len(times) for times in wanted])[:-1]
-    merged = np.asarray(every * 1e-9)
+    merged = np.asarray(every * tick)
     if asked.measured:  # nothing is known beyond the end, by which the last may be rounded up
         merged = np.minimum(merged, end)
     return Times(merged, *np.split(place, ends))

@@ -49,6 +49,15 @@ def test_no_time_is_beyond_the_end_of_a_file(tmp_path: Path) -> None:
     assert len(times.asked) == len(np.unique(times.asked))
 
 
+def test_the_samples_of_a_short_motion_stay_apart(tmp_path: Path) -> None:
+    end = 1e-7  # as of a specimen of a few micrometres, in which a nanosecond is long
+    shaken = SHAKEN.replace("20 Hz", "20000000 Hz")
+    times = output_times(tmp_path, f"drive: {shaken}", end)
+    step = np.diff(times.asked[times.integrated])
+    np.testing.assert_allclose(step, end / len(step), rtol=1e-5)
+    assert len(np.unique(times.shown)) == len(times.shown)
+
+
 def test_a_failure_on_the_other_branch_leaves_the_case(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
