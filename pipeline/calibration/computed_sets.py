@@ -26,7 +26,6 @@ from pipeline.problem.fields import named_files
 from pipeline.problem.reading import yaml_file
 from pipeline.runtime import write_atomically
 from sim.core import Floats
-from sim.structure import unrotated_inertia
 
 LABEL = f"{SYNTHETIC_LABEL}: computed, not measured"
 YAML = "calibration.yaml"
@@ -58,8 +57,7 @@ def simulate_decay(
     """Computes times in s and noisy angles in rad, of the oscillation about one hinge."""
     given = asked.virtual
     assert given is not None
-    _, inertia = unrotated_inertia(true.material.density, true.spacing)
-    frequency = float(np.sqrt(true.material.bending_stiffness / inertia))
+    frequency = free_decay.hinge_frequency(true)
     time = np.arange(int(given.duration * given.rate)) / given.rate
     course = free_decay.decay_terms(time, true.ratio, frequency) @ [0.0, 0.0, given.amplitude, 0.0]
     return time, course + given.noise * random.normal(size=len(time))

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
+from pipeline.calibration.experiments import DecayTest
 from pipeline.calibration.fit_uncertainty import Uncertainty, invert_information, slopes
 from pipeline.calibration.inputs import ConstantName, Constants
 from pipeline.calibration.least_squares import Fit
@@ -17,6 +18,8 @@ WEAK_FROM, NOTHING_FROM = 0.1, 1.0
 TOLD_APART = 30.0
 """Condition number from which constants are hardly told apart."""
 CONVERGED = 0.05
+ALIKE = 1.25
+"""Ratio of a trace's frequency to that of the law of its damping, up to which both swing alike."""
 _MANY = 1e6
 """Freedom from which Student's distribution is the normal one."""
 DERIVED: tuple[ConstantName, ...] = ("damping_translation", "damping_rotation")
@@ -180,4 +183,20 @@ def _of_set(fit: Fit, told: Quality, k: int) -> list[str]:
             f" {told.autocorrelation[k]:.2f}): the model misses something, and the intervals are"
             " too narrow"
         )
-    return out
+    return out + _of_decay(fit, k)
+
+
+def _of_decay(fit: Fit, k: int) -> list[str]:
+    """Warns of a trace of units that swing otherwise than the law of its damping ratio has it."""
+    experiment, here = fit.model.experiments[k], fit.model.constants(fit.unknowns)
+    if not isinstance(experiment, DecayTest):
+        return []
+    pitch, swung = experiment.pitch(here), experiment.peaks.frequency / (2 * np.pi)
+    if 1 / ALIKE <= pitch <= ALIKE:
+        return []
+    return [
+        f"{experiment.measured.name}: the trace swings at {swung:.3g} Hz, where one unit on one"
+        f" ligament of these constants turns at {swung / pitch:.3g} Hz: its damping ratio is not"
+        " the one that damping is made of; let both units hang free, and check density, spacing"
+        " and bending_stiffness"
+    ]

@@ -11,6 +11,7 @@ from pipeline.calibration.inputs import ConstantName, Constants, FreeDecay
 from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from sim.core import Floats
+from sim.structure import unrotated_inertia
 
 APART = 0.75
 """Peaks are at least so many periods apart."""
@@ -96,6 +97,11 @@ class DecayTest:
     peaks: DecayPeaks
     sees: tuple[ConstantName, ...] = ("damping_ratio", "damping_rotation", "bending_stiffness")
 
+    def pitch(self, constants: Constants) -> float:
+        """Divides the frequency of the trace by that of the law that tells its damping ratio."""
+        undamped = self.peaks.frequency / np.sqrt(1 - self.peaks.ratio**2)
+        return float(undamped / hinge_frequency(constants))
+
     @property
     def own_start(self) -> Floats:
         """Fits offset, drift and amplitudes at the peaks' frequency and damping."""
@@ -113,6 +119,12 @@ class DecayTest:
         """Predicts angles, see ``experiment.Experiment``."""
         shapes = decay_terms(self.measured.abscissa, constants.ratio, float(np.exp(own[-1])))
         return np.asarray(shapes @ own[:-1])
+
+
+def hinge_frequency(constants: Constants) -> float:
+    """Computes the undamped frequency (rad/s) of one unit on one ligament, by the authors' law."""
+    _, inertia = unrotated_inertia(constants.material.density, constants.spacing)
+    return float(np.sqrt(constants.material.bending_stiffness / inertia))
 
 
 def decay_terms(time: Floats, ratio: float, frequency: float) -> Floats:

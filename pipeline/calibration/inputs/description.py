@@ -132,7 +132,7 @@ class DecayColumns(Section):
 
 
 class FreeDecay(Section):
-    """Angle over time of two units on one ligament that was bent and let go.
+    """Angle over time of two units, both hanging free, on one ligament that was bent and let go.
 
     Attributes:
         name: of the set.

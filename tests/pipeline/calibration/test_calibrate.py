@@ -18,10 +18,12 @@ from pipeline.problem.reading import load_section
 from pipeline.problem.sections import MaterialConstants
 from tests.pipeline.calibration.specimens import (
     STIFFNESS,
+    TRUTH,
     decay_set,
     described,
     force_sets,
     synthesised,
+    written,
 )
 from tests.pipeline.conftest import Failing
 
@@ -137,6 +139,24 @@ def test_what_data_do_not_tell_is_said(tmp_path: Path, capsys: pytest.CaptureFix
     found = datasets.read(tmp_path / "found.nc", "calibration")
     assert found["status"].values.tolist()[:2] == [0, 2]
     assert "shear_stiffness: 1.19 " not in (tmp_path / "found.yaml").read_text()
+
+
+def test_a_trace_that_swings_otherwise_than_its_law_is_warned_of(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    time = np.arange(256) / 960
+    # of two squares, one of them held: the other swings about the ligament, not about its middle
+    angle = 8.0 * np.exp(-0.02 * 184.0 * time) * np.cos(184.0 * time)
+    rows = [f"{t:.6f},{a:.6f}" for t, a in zip(time, angle, strict=True)]
+    (tmp_path / "decay.csv").write_text("\n".join(["time (s),angle (deg)", *rows]))
+    each = {"kind": "free_decay", "name": "decay", "file": "decay.csv"}
+    text = {**described([each], ["damping_ratio"]), "material": TRUTH}
+    del text["virtual"]
+    path = written(tmp_path, text)
+    assert run_stage("calibrate", [str(path), "--out", str(tmp_path / "found.nc")]) == 0
+    said = capsys.readouterr().err
+    assert "decay: the trace swings at 29.3 Hz, where one unit on one ligament" in said
+    assert "turns at 74.7 Hz" in said
 
 
 def test_the_constants_are_not_written_over_their_description(made: Path, failing: Failing) -> None:
