@@ -12,6 +12,8 @@ from pipeline.comparison.alignment import Lag, SampledMotion
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints, Mask
 
+BOTH: Mask = np.ones(2, dtype=bool)
+"""A drive that displaces its units along x and y."""
 _HARDLY = 0.01  # of the greatest load: none yet
 
 
@@ -48,7 +50,9 @@ def drive_direction(response: xr.Dataset) -> Floats:
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def find_axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool) -> ComparisonAxis:
+def find_axis(
+    time: Floats, drive: Floats, response: xr.Dataset, *, static: bool, moved: Mask = BOTH
+) -> ComparisonAxis:
     """Places the measured frames on the axis of a response of one structure and case.
 
     Args:
@@ -56,6 +60,7 @@ def find_axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool
         drive: (frames, 2) measured displacement of the driven units, mm.
         response: the nominal one.
         static: whether it is a path of equilibria.
+        moved: (2,) whether the drive displaces its units along x and y, or lets them slide there.
 
     Raises:
         UserError: the drive cannot be aligned, or is a force, a moment or a rotation.
@@ -65,17 +70,23 @@ def find_axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool
         what = "the drive displaces no units, along which frames could be placed"
         remedy = "drive the problem by the displacement that was filmed, or remove the recording"
         raise UserError(what, key="drive.kind", remedy=remedy)
+    held = np.where(moved, drive, 0.0)  # what slides tells of the specimen, not of the drive
     if not static:
-        lag = alignment.find_lag(SampledMotion(time, drive), nominal)
-        turn = alignment.drive_turn(drive, nominal.at(time - lag.value))
+        lag = alignment.find_lag(SampledMotion(time, held), nominal)
+        turn = _turn(held, nominal.at(time - lag.value), moved)
         still = np.full(len(time), alignment.MOTION, dtype=np.int8)
         shown = np.where(time - lag.value <= nominal.time[-1], time - lag.value, np.nan)
         return ComparisonAxis(shown, still, lag, turn)
     way = drive_direction(response)
     pushed = SampledMotion(nominal.time, (nominal.value @ way)[:, None])
-    shown = alignment.find_load_time(drive @ way, pushed)
-    turn = alignment.drive_turn(drive, nominal.at(shown))
-    return ComparisonAxis(shown, alignment.find_branches(drive @ way), None, turn)
+    shown = alignment.find_load_time(held @ way, pushed)
+    turn = _turn(held, nominal.at(shown), moved)
+    return ComparisonAxis(shown, alignment.find_branches(held @ way), None, turn)
+
+
+def _turn(held: Floats, nominal: Floats, moved: Mask) -> float:
+    """Computes by how much the drive was turned, rad; NaN where it does not hold both ways."""
+    return alignment.drive_turn(held, nominal) if moved.all() else np.nan
 
 
 def interpolate_response(response: xr.Dataset, time: Floats) -> NominalSide:

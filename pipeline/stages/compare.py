@@ -77,9 +77,10 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     built = as_built(design, recording.structure)
     structure = structures_of(scene_of(asked, args.problem.parent), design)[recording.structure]
     scene = structure.scene
-    leading = scene.lattice.id[scene.loads.cases[0].leading]
+    drive = scene.loads.cases[0]
+    leading = scene.lattice.id[drive.leading]
     every = prepare_measurement(datasets.read(args.track, "track"), built, leading)
-    axis = find_axis(every.time, every.drive, response, static=asked.static)
+    axis = find_axis(every.time, every.drive, response, static=asked.static, moved=drive.displaces)
     frequency = np.nan if asked.frequency is None else asked.frequency
     _check_zero(untared_force(every.force, axis.resting), recording, args.recording)
     kept = select_frames(axis.time, 1 / frequency)

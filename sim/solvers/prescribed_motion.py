@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.core import Floats, Ints, Numbers
+from sim.core import Floats, Ints, Mask, Numbers
 from sim.energy import Topology
 from sim.solvers.loads import (
     DISPLACEMENT,
@@ -47,6 +47,14 @@ class PrescribedMotion(NamedTuple):
         if not isinstance(self.motion, Together):
             return self.units
         return self.units[np.asarray(self.motion.shares)[:, 0] != 0.0]
+
+    @property
+    def displaces(self) -> Mask:
+        """(2,) whether it displaces all its leading units along x and y."""
+        if self.control is None:
+            return np.ones(2, dtype=bool)
+        leading = np.isin(self.units, self.leading)
+        return np.asarray((self.control[leading, :2] == DISPLACEMENT).all(axis=0))
 
     def forces(self, times: Floats) -> Floats:
         """Forces (n_times, n, 3) that it puts on its units, N and N mm; zero where it puts none."""

@@ -217,3 +217,17 @@ def test_a_drive_by_a_force_has_no_axis(static: bool) -> None:
     )
     with refused("displaces no units", "drive.kind"):
         find_axis(TIMES, sine(TIMES), response, static=static)
+
+
+@pytest.mark.parametrize("static", [True, False])
+def test_a_side_that_slides_freely_is_no_turn_of_the_drive(static: bool) -> None:
+    pushed = np.stack([-4.0 * TIMES**2, np.zeros_like(TIMES)], axis=1)
+    slid = pushed + np.stack([np.zeros_like(TIMES), 3.0 * np.sin(TIMES)], axis=1)
+    response = xr.Dataset(
+        {"drive_displacement": (("time", "xy"), pushed)}, {"time": TIMES, "direction": 180.0}
+    )
+    found = find_axis(TIMES, slid, response, static=static, moved=np.array([True, False]))
+    np.testing.assert_allclose(found.time[:-1], TIMES[:-1], atol=1e-4)
+    assert np.isnan(found.turn)
+    if found.lag is not None:
+        assert found.lag.correlation == pytest.approx(1.0, abs=1e-6)
