@@ -160,7 +160,8 @@ def load(
     wanted = problem.outputs(chosen)
     if missing := [kind for kind in wanted if kind not in files]:
         what = f"the report of this problem also shows its {missing[0]} dataset"
-        raise UserError(what, file=path, remedy=f"give it as --{missing[0]}")
+        option = missing[0].replace("_", "-")
+        raise UserError(what, file=path, remedy=f"give it as --{option}")
     read = {name: datasets.read(files[name], cast(Kind, REPORTED[name].kind)) for name in wanted}
     for name, data in read.items():
         posed = chosen

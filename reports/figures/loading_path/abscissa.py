@@ -117,11 +117,26 @@ def load_names(problem: Problem, response: xr.Dataset | xr.DataArray) -> tuple[s
 
 
 def load_kind(problem: Problem, angle: float) -> str:
-    """Tells compression, extension and shear along an angle (deg) by the side that is driven."""
+    """Tells compression, extension and shear along an angle (deg) by the side that is driven.
+
+    A drive of units within the lattice is only "along" its angle.
+    """
     outward, axis = driven_side(problem)
+    if not drives_side(problem):
+        return "along"
     turned = np.radians(angle)
     pull = np.sign(outward[axis]) * (np.cos(turned), np.sin(turned))[axis]
     return "compression" if pull < -_ALONG else "extension" if pull > _ALONG else "shear"
+
+
+def drives_side(problem: Problem) -> bool:
+    """Tells units first driven that are nearer to the end of a line through the middle than to it.
+
+    The line is that along which `driven_side` finds them.
+    """
+    outward, axis = driven_side(problem)
+    span = float(np.ptp([site[1 + axis] for site in problem.lattice.sites()]))
+    return bool(abs(outward[axis]) > span / 4)
 
 
 def driven_side(problem: Problem) -> tuple[Floats, int]:

@@ -38,6 +38,7 @@ from reports.figures.loading_path.abscissa import (
     Abscissa,
     abscissa_of,
     driven_side,
+    drives_side,
     lattice_size,
     load_kind,
     load_names,
@@ -156,8 +157,11 @@ def _load_fact(path: Abscissa) -> Fact:
 def strain_facts(problem: Problem, path: Abscissa) -> Iterator[Fact]:
     """Yields the strain along the line from the middle to the driven side, a row for each kind.
 
-    There is none of several drives that displace: the others' sides move as well.
+    There is none of several drives that displace: the others' sides move as well; and none of a
+    drive of units within the lattice.
     """
+    if not drives_side(problem):
+        return
     if sum(drive.kind not in LOADS for drive in single_drives(problem.drive)) > 1:
         return
     _, axis = driven_side(problem)

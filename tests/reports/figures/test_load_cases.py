@@ -154,6 +154,14 @@ def test_two_sides_that_are_pressed_have_no_strain_by_one() -> None:
     assert not list(facts.strain_facts(asked.model_copy(update={"drive": both}), PATH))
 
 
+def test_a_drive_of_inner_units_strains_no_lattice() -> None:
+    asked = problem.load(FIG4)
+    inner = asked.drive.model_copy(update={"units": "centre", "directions": (0.0, np.pi / 2)})
+    pushed = asked.model_copy(update={"drive": inner})
+    assert not list(facts.strain_facts(pushed, PATH))
+    assert [abscissa.load_kind(pushed, angle) for angle in (0.0, 90.0)] == ["along", "along"]
+
+
 @pytest.mark.parametrize("count", [2, 4])
 def test_a_legend_of_several_loads_is_below_all_curves(two: StudyResults, count: int) -> None:
     """It names every curve once, and leaves to a panel what is in that one alone."""

@@ -170,6 +170,14 @@ def test_comparisons_are_read_from_their_folders(tmp_path: Path) -> None:
         load(problem, None, files, [file])
 
 
+def test_a_missing_dataset_is_asked_for_by_its_option(tmp_path: Path) -> None:
+    made = compressed_study.written(tmp_path, compressed_study.SHIELD)
+    files = {kind: tmp_path / f"{kind}.nc" for kind in made.datasets if "geometric" not in kind}
+    with pytest.raises(UserError) as error:
+        load(tmp_path / "problem.yaml", None, files)
+    assert error.value.remedy == "give it as --geometric-design"
+
+
 def test_pixels_are_told_over_those_stated_if_any(filmed: dict[str, StudyResults]) -> None:
     study = filmed["study"]
 
