@@ -36,7 +36,7 @@ from sim.structure import clearance
 
 CLEARANCE_STRIDE = 4
 """Gaps and overlaps of a motion in time are looked for in every so many samples."""
-TICKS = 1e8
+TICKS = 1e7
 """Parts of a horizon that times of the output are told apart by, at least."""
 NOT_ASKED, UNSTABLE, STABLE = -1, 0, 1
 """Stability of a state: no equilibrium; no minimum of the energy; a minimum. More by
