@@ -1,11 +1,11 @@
 /* Loops over the ligaments: energy, gradient, tangent and mixed derivatives.
 
    Derived by hand from sim/energy/ligament.py and tested against its automatic derivatives. With d
-   the current ligament vector, n and t its unit tangent and normal, L its length, gamma its shear
-   angle,
+   the current ligament vector, n and t the unit vectors along and across it, L its length and l0
+   that at rest, gamma its shear angle, kappa the relative rotation of its units,
 
        dW/dd = k_l (L - l0) n + k_s l0^2 gamma t / L,
-       dW/dtheta = -k_s l0^2 gamma / 2 -+ k_theta kappa,
+       dW/dtheta = -k_s l0^2 gamma / 2 -+ k_b kappa,
 
    each strain taken from its natural value (zero but where a ligament is not free of stress at
    rest), and the motions of the two units enter through
@@ -17,6 +17,7 @@
 #include <math.h>
 #include <string.h>
 
+/* Fills cos and sin of all rotations, from those of their halves, and these. */
 static void trigonometry(const double *motion, int64_t n_units, double *turn) {
     for (int64_t unit = 0; unit < n_units; unit++) {
         double half = 0.5 * motion[3 * unit + 2];
@@ -29,9 +30,13 @@ static void trigonometry(const double *motion, int64_t n_units, double *turn) {
     }
 }
 
+/* The arms R_a r_a and R_b r_b of both ends, and the ligament's vector d. */
 typedef struct { double pax, pay, pbx, pby, dx, dy; } Rotated;
+/* L, l0, and the stretch L - l0 and relative rotation kappa from their natural values. */
 typedef struct { double length, rest, stretch, bend; } Lengths;
+/* First derivatives of W: by d, and by the rotation of either unit with d held. */
 typedef struct { double gx, gy, wa, wb; } Forces;
+/* Second derivatives of W: by d twice, and by d and the rotation of either unit. */
 typedef struct { double hxx, hxy, hyy, mx, my; } Second;
 
 static inline Rotated rotated(const double *motion, const double *turn, const NetworkArrays *net, int64_t k) {
@@ -71,7 +76,7 @@ static inline Lengths lengths(const double *motion, const NetworkArrays *net, in
 
 static inline Forces forces(const NetworkArrays *net, int64_t k, double dx, double dy, Lengths l, double shear) {
     const double *law = net->law + 3 * k;
-    /* dW/dd = k_l (l - l0) n + k_s l0^2 gamma t / l, with n along d and t across; M = k_b bend */
+    /* dW/dd = k_l (L - l0) n + k_s l0^2 gamma t / L; dW/dtheta = -k_s l0^2 gamma / 2 -+ k_b kappa */
     double nx = dx / l.length, ny = dy / l.length;
     double tension = law[0] * l.stretch;
     double torque = law[1] * l.rest * l.rest * shear;
@@ -85,7 +90,9 @@ static inline Forces forces(const NetworkArrays *net, int64_t k, double dx, doub
 }
 
 static inline Second second(const NetworkArrays *net, int64_t k, double dx, double dy, Lengths l, double shear) {
-    /* d2W = k_l n n' + (k_l (l - l0) / l + k_s l0^2 / l^2) t t' - k_s l0^2 gamma / l^2 (n t' + t n') */
+    /* d2W/dd2 = k_l n n' + (k_l (L - l0) / L + k_s l0^2 / L^2) t t'
+                 - k_s l0^2 gamma / L^2 (n t' + t n'),
+       d2W/dd dtheta = -k_s l0^2 t / (2 L) */
     double nx = dx / l.length, ny = dy / l.length;
     double axial = net->law[3 * k], torsion = net->law[3 * k + 1] * l.rest * l.rest;
     double along = axial;
@@ -136,7 +143,7 @@ double ligament_kernels_gradient(
         double shear = shear_of(kinematics->turn, net, k, r.dx, r.dy);
         kinematics->shear[k] = shear;
         Forces f = forces(net, k, r.dx, r.dy, l, shear);
-        /* W = k_l (l - l0)^2 / 2 + k_s (l0 gamma)^2 / 2 + k_b bend^2 / 2 */
+        /* W = k_l (L - l0)^2 / 2 + k_s (l0 gamma)^2 / 2 + k_b kappa^2 / 2 */
         strain_energy += 0.5 * (
             law[0] * (l.stretch * l.stretch)
             + law[1] * ((l.rest * shear) * (l.rest * shear))
@@ -151,6 +158,7 @@ double ligament_kernels_gradient(
     return strain_energy;
 }
 
+/* Fills the lower half of the Hessian in the dofs (u_a, theta_a, u_b, theta_b). */
 static inline void ligament_block(
     int64_t k, const double *motion, const Kinematics *kinematics, const NetworkArrays *net, double block[6][6]) {
     Rotated r = rotated(motion, kinematics->turn, net, k);
@@ -158,7 +166,7 @@ static inline void ligament_block(
     Forces f = forces(net, k, r.dx, r.dy, l, kinematics->shear[k]);
     Second h = second(net, k, r.dx, r.dy, l, kinematics->shear[k]);
     double torsion = 0.25 * net->law[3 * k + 1] * l.rest * l.rest, bending = net->law[3 * k + 2];
-    /* dd/dtheta_a = (pay, -pax), dd/dtheta_b = (-pby, pbx) */
+    /* dd/dtheta_a = (pay, -pax), dd/dtheta_b = (-pby, pbx); the second ones are R_a r_a, -R_b r_b */
     double hax = h.hxx * r.pay - h.hxy * r.pax, hay = h.hxy * r.pay - h.hyy * r.pax;
     double hbx = -h.hxx * r.pby + h.hxy * r.pbx, hby = -h.hxy * r.pby + h.hyy * r.pbx;
     double across_a = h.mx * r.pay - h.my * r.pax, across_b = h.my * r.pbx - h.mx * r.pby;
@@ -239,7 +247,7 @@ void ligament_kernels_mixed(
         double fy = h.hxy * ex + h.hyy * ey + h.my * (la + lb);
         double ca = kinematics->turn[4 * ua], sa = kinematics->turn[4 * ua + 1];
         double cb = kinematics->turn[4 * ub], sb = kinematics->turn[4 * ub + 1];
-        /* d moves by (int64_t - R_a) dr_a and (R_b - int64_t) dr_b; the arms also turn with the direction */
+        /* dd = (I - R_a) dr_a + (R_b - I) dr_b; the arms also turn with the direction */
         double hx = fx + la * f.gy, hy = fy - la * f.gx;
         out->arm[4 * k] += fx - (ca * hx + sa * hy);
         out->arm[4 * k + 1] += fy - (-sa * hx + ca * hy);
@@ -247,6 +255,8 @@ void ligament_kernels_mixed(
         out->arm[4 * k + 2] += cb * hx + sb * hy - fx;
         out->arm[4 * k + 3] += -sb * hx + cb * hy - fy;
 
+        /* k_l (L - l0) dL + k_s l0^2 gamma dgamma, with the rates dL and dgamma along the direction,
+           by l0 and by the angle of the vector (over l0^2) */
         const double *law = net->law + 3 * k;
         double nx = r.dx / l.length, ny = r.dy / l.length;
         double stretching = nx * ex + ny * ey;

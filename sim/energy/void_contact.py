@@ -19,8 +19,7 @@ def contact_energy(void_angle: float | Array, law: ContactLaw) -> Array:
 
     With x = (angle - cutoff) / (cutoff - barrier) it is k/4 (cutoff - barrier)^2 (1/(x+1) - 1/(x-1)
     - 2), which is k/2 (angle - cutoff)^2 / (1 - x^2). Beyond the barrier the authors' law is
-    silently zero; here it
-    is infinite: a state there is not admissible.
+    silently zero; here it is infinite: a state there is not admissible.
     """
     width = law.cutoff - law.barrier
     x = jnp.minimum(void_angle - law.cutoff, 0.0) / width

@@ -1,6 +1,6 @@
 /* Contact on the angle of the voids: energy, gradient, tangent, mixed derivatives.
 
-   Derived by hand from sim/energy/ligament.py and tested against its automatic derivatives. Units
+   Derived by hand from sim/energy/void_contact.py and tested against its automatic derivatives. Units
    are rigid, so the two voids beside a ligament open and close with the rotation of its first unit
    against its second, the "turn". */
 #include "sim/core/numbers.h"
