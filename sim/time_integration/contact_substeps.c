@@ -2,9 +2,9 @@
 
    Units fly straight on but where a void is closed to its cutoff: there the barrier turns them
    back, the faster the deeper they are. This part of the motion is local and needs no ligament's
-   force, so the rotations of those units take finer steps of the same splitting, as many as the
-   depth asks for that their energy can carry them to. The steps of all else need not follow the
-   barrier. */
+   force, so the rotations of those units take substeps of the same splitting (drift and kick), as
+   many as the depth asks for that their energy can carry them to. The steps of all else need not
+   follow the barrier. */
 #include "sim/time_integration/time_integration.h"
 
 #include <stdlib.h>
@@ -14,7 +14,7 @@
 static const double MARGIN = 0.03490658503988659;
 /* Stiffness of voids that share units, over that of one alone. */
 static const double SHARED = 2.0;
-/* Finer steps of one flight at most. */
+/* Substeps of one flight at most. */
 enum { MOST = 4096 };
 
 Flight contact_substeps_flight_of(const int64_t *watched, int64_t n_watched, int64_t n_units) {
@@ -23,7 +23,7 @@ Flight contact_substeps_flight_of(const int64_t *watched, int64_t n_watched, int
     return (Flight){
         .watched = watched, .n_watched = n_watched, .near = near, .units = near + n_watched,
         .met = near + n_watched + n_units, .angle = angle, .rate = angle + n_units,
-        .force = angle + 2 * n_units, .pull = angle + 3 * n_units};
+        .force = angle + 2 * n_units, .bar_held = angle + 3 * n_units};
 }
 
 void contact_substeps_free(Flight *flight) {
@@ -83,12 +83,13 @@ static void find(
 }
 
 /* Reciprocal rotational inertia of a unit, zero if its rotation is held. */
-static inline double agility_of(int64_t unit, const System *system) {
+static inline double inverse_inertia_of(int64_t unit, const System *system) {
     int64_t d = 3 * unit + 2;
     return system->free[d] >= 0 ? 1.0 / system->mass[d] : 0.0;
 }
 
-/* Curvature of a void's barrier where all of an energy is in it. */
+/* Curvature of a void's barrier where all of an energy E is in it: by x^2 = E / (E + s), with
+   s = k w^2 / 2 and w = cutoff - barrier, it is k / 2 (2 + 6 x^2) / (1 - x^2)^3. */
 static double curvature_at(double energy, const double *law) {
     double stiffness = law[0], barrier = law[1], cutoff = law[2];
     double scale = 0.5 * stiffness * square(cutoff - barrier);
@@ -96,21 +97,23 @@ static double curvature_at(double energy, const double *law) {
     return 0.5 * stiffness * (8.0 - 6.0 * rest) / (rest * (rest * rest));
 }
 
-/* Counts the finer steps that follow the barrier where the energy of each void can carry it. */
-static int64_t finer_steps(
+/* Counts the substeps that follow the barrier where the energy of each void can carry it: the
+   frequency there is the root of the curvature times the two units' inverse inertias. */
+static int64_t count_substeps(
     double tau, const Pace *pace, const System *system, const Flight *flight) {
     double fastest = 0.0;
     EACH(i, flight->n_near) {
         int64_t k = flight->near[i];
         Joined by = joined_by(system, k);
-        double agility = agility_of(by.a, system) + agility_of(by.b, system);
-        if (agility > 0.0) {
+        double inverse_inertia =
+            inverse_inertia_of(by.a, system) + inverse_inertia_of(by.b, system);
+        if (inverse_inertia > 0.0) {
             double turn = flight->angle[by.a] - flight->angle[by.b];
             double rate = flight->rate[by.a] - flight->rate[by.b];
-            double energy = 0.5 * rate * rate / agility;
+            double energy = 0.5 * rate * rate / inverse_inertia;
             EACH(side, 2) energy += slopes_of(system, k, side, turn).energy;
             double curvature = curvature_at(energy, system->net.contact + 3 * k);
-            fastest = most(fastest, SHARED * curvature * agility);
+            fastest = most(fastest, SHARED * curvature * inverse_inertia);
         }
     }
     double steps = fabs(tau) * sqrt(fastest) / pace->reach;
@@ -133,22 +136,24 @@ static bool fill_moments(const double *u, const System *system, Flight *flight) 
     return true;
 }
 
-static void turn_on(double tau, double *u, const double *v, const Flight *flight) {
+/* Adds tau v to the rotations of the units that meet. */
+static void drift(double tau, double *u, const double *v, const Flight *flight) {
     EACH(i, flight->n_units) {
         int64_t d = 3 * flight->units[i] + 2;
         u[d] += tau * v[d];
     }
 }
 
-static void push(double tau, double *v, const System *system, const Flight *flight) {
+/* Takes tau M^-1 dW/du, by the moments in the flight, from their velocities. */
+static void kick(double tau, double *v, const System *system, const Flight *flight) {
     EACH(i, flight->n_units) {
         int64_t unit = flight->units[i];
-        v[3 * unit + 2] -= tau * agility_of(unit, system) * flight->force[unit];
+        v[3 * unit + 2] -= tau * inverse_inertia_of(unit, system) * flight->force[unit];
     }
 }
 
-/* Takes the units that meet through n finer steps; tells whether no barrier is passed. */
-static bool bounce(
+/* Takes the units that meet through n substeps; tells whether no barrier is passed. */
+static bool take_substeps(
     double tau, int64_t n, double *u, double *v, const Pace *pace, const System *system,
     Flight *flight) {
     EACH(i, flight->n_units) {
@@ -159,11 +164,11 @@ static bool bounce(
     double delta = tau / n;
     EACH(step, n) {
         EACH(m, pace->n_kicks) {
-            turn_on(pace->drifts[m] * delta, u, v, flight);
+            drift(pace->drifts[m] * delta, u, v, flight);
             if (!fill_moments(u, system, flight)) return false;
-            push(pace->kicks[m] * delta, v, system, flight);
+            kick(pace->kicks[m] * delta, v, system, flight);
         }
-        turn_on(pace->drifts[pace->n_drifts - 1] * delta, u, v, flight);
+        drift(pace->drifts[pace->n_drifts - 1] * delta, u, v, flight);
     }
     return true;
 }
@@ -173,27 +178,27 @@ int64_t contact_substeps_fly(
     find(tau, u, v, system, flight);
     EACH(i, system->n_dofs) u[system->dofs[i]] += tau * v[system->dofs[i]];
     if (flight->n_near == 0) return 0;
-    for (int64_t n = finer_steps(tau, pace, system, flight); n <= MOST; n *= 2)
-        if (bounce(tau, n, u, v, pace, system, flight)) return n;
+    for (int64_t n = count_substeps(tau, pace, system, flight); n <= MOST; n *= 2)
+        if (take_substeps(tau, n, u, v, pace, system, flight)) return n;
     return -1;
 }
 
-/* Reverse of `push` at the moments held in the flight. */
-static void pull(
+/* Adjoint of `kick` at the moments held in the flight. */
+static void kick_adjoint(
     double weight, const double *u, double *bar_u, const double *bar_v, const System *system,
     const Flight *flight, const Bars *bars) {
     const Sensitivity *out = &bars->sensitivity;
     EACH(i, flight->n_units) {
         int64_t unit = flight->units[i], d = 3 * unit + 2;
-        double agility = agility_of(unit, system);
-        bars->mass[d] += weight * agility * agility * flight->force[unit] * bar_v[d];
+        double inverse = inverse_inertia_of(unit, system);
+        bars->mass[d] += weight * inverse * inverse * flight->force[unit] * bar_v[d];
     }
     EACH(i, flight->n_near) {
         int64_t k = flight->near[i];
         Joined by = joined_by(system, k);
         double turning = -weight * (
-            agility_of(by.a, system) * bar_v[by.turn_a]
-            - agility_of(by.b, system) * bar_v[by.turn_b]);
+            inverse_inertia_of(by.a, system) * bar_v[by.turn_a]
+            - inverse_inertia_of(by.b, system) * bar_v[by.turn_b]);
         EACH(side, 2) {
             Slopes of = slopes_of(system, k, side, u[by.turn_a] - u[by.turn_b]);
             double moment = of.curvature * turning;
@@ -205,29 +210,29 @@ static void pull(
     }
 }
 
-/* Reverse of `turn_on`. */
-static void turn_back(
-    double drift, double *u, const double *v, const double *bar_u, double *bar_v,
+/* Adjoint of `drift`, which it undoes. */
+static void drift_adjoint(
+    double weight, double *u, const double *v, const double *bar_u, double *bar_v,
     const System *system, const Flight *flight) {
     EACH(i, flight->n_units) {
         int64_t d = 3 * flight->units[i] + 2;
-        if (system->free[d] >= 0) bar_v[d] += drift * bar_u[d];
+        if (system->free[d] >= 0) bar_v[d] += weight * bar_u[d];
     }
-    turn_on(-drift, u, v, flight);
+    drift(-weight, u, v, flight);
 }
 
-/* Reverse of `bounce` from its end; the states come back as they went, to rounding. */
-static void bounce_back(
+/* Adjoint of `take_substeps` from its end; the states come back as they went, to rounding. */
+static void substeps_adjoint(
     double tau, int64_t n, double *u, double *v, double *bar_u, double *bar_v, const Pace *pace,
     const System *system, Flight *flight, const Bars *bars) {
     double delta = tau / n;
     EACH(step, n) for (int64_t m = pace->n_kicks; m >= 0; m--) {
-        turn_back(pace->drifts[m] * delta, u, v, bar_u, bar_v, system, flight);
+        drift_adjoint(pace->drifts[m] * delta, u, v, bar_u, bar_v, system, flight);
         if (m > 0) {
-            double kick = pace->kicks[m - 1] * delta;
+            double weight = pace->kicks[m - 1] * delta;
             fill_moments(u, system, flight);
-            push(-kick, v, system, flight);
-            pull(kick, u, bar_u, bar_v, system, flight, bars);
+            kick(-weight, v, system, flight);
+            kick_adjoint(weight, u, bar_u, bar_v, system, flight, bars);
         }
     }
 }
@@ -244,9 +249,9 @@ void contact_substeps_fly_back(
         int64_t d = system->dofs[i];
         if (n == 0 || d % 3 != 2 || !flight->met[d / 3]) bar_v[d] += tau * bar_u[d];
     }
-    if (n > 0) bounce_back(tau, n, u, v, bar_u, bar_v, pace, system, flight, bars);
+    if (n > 0) substeps_adjoint(tau, n, u, v, bar_u, bar_v, pace, system, flight, bars);
     EACH(i, flight->n_units) {
         int64_t unit = flight->units[i], d = 3 * unit + 2;
-        if (system->free[d] < 0) flight->pull[unit] = bar_u[d];
+        if (system->free[d] < 0) flight->bar_held[unit] = bar_u[d];
     }
 }

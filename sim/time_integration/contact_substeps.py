@@ -1,4 +1,4 @@
-"""Paces the finer steps at contact on void angles, which ``contact_substeps.c`` takes."""
+"""Paces the substeps at contact on void angles, which ``contact_substeps.c`` takes."""
 
 from typing import NamedTuple
 
@@ -6,8 +6,8 @@ from sim.core import Floats
 
 
 class Pace(NamedTuple):
-    """Holds the splitting of the finer steps."""
+    """Holds the splitting of the substeps."""
 
-    drifts: Floats  # its coefficients
-    kicks: Floats  # its coefficients
-    reach: float  # longest finer step times the angular frequency of the barrier
+    drifts: Floats  # (n_kicks + 1,) parts of a substep for which rotations drift
+    kicks: Floats  # (n_kicks,) parts of a substep for which moments act
+    reach: float  # longest substep times the angular frequency of the barrier, rad

@@ -125,9 +125,9 @@ static double advance(int64_t n, Motion *motion) {
         copy(motion->trace.v + at, motion->v, motion->n_dofs);
         hold(n, m, motion->u, motion);
         double tau = steps->pace.drifts[m] * steps->h;
-        int64_t finer = contact_substeps_fly(
+        int64_t substeps = contact_substeps_fly(
             tau, motion->u, motion->v, &steps->pace, motion->system, &motion->flight);
-        if (finer < 0) return INFINITY;
+        if (substeps < 0) return INFINITY;
         if (m < motion->n_kicks) total += kick(n, m, motion);
     }
     return total;
@@ -194,8 +194,8 @@ static void flight_back(
     EACH(i, system->n_held) {
         int64_t unit = system->held[i] / 3;
         if (system->held[i] % 3 == 2 && flight->met[unit]) {
-            drive.last[i] += 0.5 * flight->pull[unit];
-            drive.following[i] += 0.5 * flight->pull[unit];
+            drive.last[i] += 0.5 * flight->bar_held[unit];
+            drive.following[i] += 0.5 * flight->bar_held[unit];
         }
     }
 }

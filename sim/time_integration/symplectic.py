@@ -12,7 +12,7 @@ class Steps(NamedTuple):
 
     n_steps: int  # number of steps
     h: float  # step, s
-    pace: Pace  # coefficients of the flights, and of the finer steps within them
+    pace: Pace  # coefficients of the flights, and of the substeps within them
     decay: Floats  # (n_kicks, n_dofs) of the kicks
     gain: Floats  # (n_kicks, n_dofs) of the kicks
     drive: Floats  # (n_steps, n_kicks, n_held) prescribed values at the kicks
