@@ -25,8 +25,10 @@ double polygons_gap_between(int64_t a, int64_t b, const ContactArrays *contacts)
 
 /* Compares two states number by number. */
 bool neighbour_list_is_same(const double *one, const double *other, int64_t n);
-/* Tells whether units met for whose coupling the tangent has no room. */
-static inline bool units_met(const ContactArrays *contacts) { return contacts->cache.found[1] > 0; }
+/* Tells whether pairs of units came near for whose coupling the tangent has no room. */
+static inline bool has_new_pairs(const ContactArrays *contacts) {
+    return contacts->cache.found[1] > 0;
+}
 
 /* Vertex, and start and end of the edge (-1: its start alone), of the k-th term found. */
 typedef struct {

@@ -167,7 +167,7 @@ int64_t neighbour_list_find(double *motion, const ContactArrays *contacts) {
         follow_motion(motion, contacts);
         collect(contacts);
     }
-    return units_met(contacts) ? -1 : cache->found[0];
+    return has_new_pairs(contacts) ? -1 : cache->found[0];
 }
 
 int64_t neighbour_list_pairs_in_contact(double *motion, const ContactArrays *contacts) {

@@ -1,8 +1,8 @@
 /* Contact on the angle of the voids: energy, gradient, tangent, mixed derivatives.
 
-   Derived by hand from sim/energy/void_contact.py and tested against its automatic derivatives. Units
-   are rigid, so the two voids beside a ligament open and close with the rotation of its first unit
-   against its second, the "turn". */
+   Derived by hand from sim/energy/void_contact.py and tested against its automatic derivatives.
+   Units are rigid, so the two voids beside a ligament open and close with the rotation of its first
+   unit against its second, the "turn". */
 #include "sim/core/numbers.h"
 #include "sim/declarations.h"
 
@@ -35,6 +35,14 @@ void void_contact_kernels_void_slopes(
     returned[0] = found.energy, returned[1] = found.slope, returned[2] = found.curvature;
 }
 
+/* The rotations' dofs of the two units that a ligament joins, and its turn. */
+typedef struct { int64_t a, b; double turn; } Joined;
+
+static inline Joined joined_by(const NetworkArrays *net, int64_t k, const double *motion) {
+    int64_t a = 3 * net->unit[2 * k] + 2, b = 3 * net->unit[2 * k + 1] + 2;
+    return (Joined){a, b, motion[a] - motion[b]};
+}
+
 static inline double curvature_of(const NetworkArrays *net, int64_t k, double turn) {
     return slopes_of(net, k, 0, turn).curvature + slopes_of(net, k, 1, turn).curvature;
 }
@@ -43,12 +51,13 @@ double void_contact_kernels_add_gradient(
     double *motion, const NetworkArrays *net, double *out) {
     double total = 0.0;
     for (int64_t t = 0; t < net->n_touching; t++) {
-        int64_t k = net->touching[t], a = 3 * net->unit[2 * k] + 2, b = 3 * net->unit[2 * k + 1] + 2;
+        int64_t k = net->touching[t];
+        Joined by = joined_by(net, k, motion);
         for (int side = 0; side < 2; side++) {
-            Slopes v = slopes_of(net, k, side, motion[a] - motion[b]);
+            Slopes v = slopes_of(net, k, side, by.turn);
             total += v.energy;
-            out[a] += v.slope;
-            out[b] -= v.slope;
+            out[by.a] += v.slope;
+            out[by.b] -= v.slope;
         }
     }
     return total;
@@ -57,12 +66,13 @@ double void_contact_kernels_add_gradient(
 void void_contact_kernels_add_tangent(
     double *motion, const NetworkArrays *net, int64_t *free, const Matrix *matrix) {
     for (int64_t t = 0; t < net->n_touching; t++) {
-        int64_t k = net->touching[t], a = 3 * net->unit[2 * k] + 2, b = 3 * net->unit[2 * k + 1] + 2;
-        double curvature = curvature_of(net, k, motion[a] - motion[b]);
+        int64_t k = net->touching[t];
+        Joined by = joined_by(net, k, motion);
+        double curvature = curvature_of(net, k, by.turn);
         if (curvature > 0.0) {
-            symmetric_add(matrix, free[a], free[a], curvature);
-            symmetric_add(matrix, free[b], free[b], curvature);
-            symmetric_add(matrix, free[a], free[b], -curvature);
+            symmetric_add(matrix, free[by.a], free[by.a], curvature);
+            symmetric_add(matrix, free[by.b], free[by.b], curvature);
+            symmetric_add(matrix, free[by.a], free[by.b], -curvature);
         }
     }
 }
@@ -70,10 +80,11 @@ void void_contact_kernels_add_tangent(
 void void_contact_kernels_add_hessian_product(
     double *motion, const NetworkArrays *net, double *direction, double *out) {
     for (int64_t t = 0; t < net->n_touching; t++) {
-        int64_t k = net->touching[t], a = 3 * net->unit[2 * k] + 2, b = 3 * net->unit[2 * k + 1] + 2;
-        double moment = curvature_of(net, k, motion[a] - motion[b]) * (direction[a] - direction[b]);
-        out[a] += moment;
-        out[b] -= moment;
+        int64_t k = net->touching[t];
+        Joined by = joined_by(net, k, motion);
+        double moment = curvature_of(net, k, by.turn) * (direction[by.a] - direction[by.b]);
+        out[by.a] += moment;
+        out[by.b] -= moment;
     }
 }
 
@@ -82,10 +93,11 @@ void void_contact_kernels_add_mixed(
     const Sensitivity *out, int64_t n_which) {
     if (net->n_touching == 0) return;
     for (int64_t w = 0; w < n_which; w++) {
-        int64_t k = which[w], a = 3 * net->unit[2 * k] + 2, b = 3 * net->unit[2 * k + 1] + 2;
-        double turning = direction[a] - direction[b];
+        int64_t k = which[w];
+        Joined by = joined_by(net, k, motion);
+        double turning = direction[by.a] - direction[by.b];
         for (int side = 0; side < 2; side++) {
-            Slopes v = slopes_of(net, k, side, motion[a] - motion[b]);
+            Slopes v = slopes_of(net, k, side, by.turn);
             if (v.curvature > 0.0) {
                 out->void_[2 * k + side] += (1.0 - 2.0 * side) * v.curvature * turning;
                 out->contact[k] += v.slope / net->contact[3 * k] * turning;
@@ -98,13 +110,14 @@ double void_contact_kernels_barrier_step(
     double *motion, const NetworkArrays *net, double *step) {
     double largest = INFINITY;
     for (int64_t t = 0; t < net->n_touching; t++) {
-        int64_t k = net->touching[t], a = 3 * net->unit[2 * k] + 2, b = 3 * net->unit[2 * k + 1] + 2;
-        double turn = motion[a] - motion[b], turning = step[a] - step[b];
+        int64_t k = net->touching[t];
+        Joined by = joined_by(net, k, motion);
+        double turning = step[by.a] - step[by.b];
         if (turning < 0.0) {
-            double room = net->void_[2 * k] + turn - net->contact[3 * k + 1];
+            double room = net->void_[2 * k] + by.turn - net->contact[3 * k + 1];
             largest = least(largest, room / -turning);
         } else if (turning > 0.0) {
-            double room = net->void_[2 * k + 1] - turn - net->contact[3 * k + 1];
+            double room = net->void_[2 * k + 1] - by.turn - net->contact[3 * k + 1];
             largest = least(largest, room / turning);
         }
     }

@@ -61,7 +61,7 @@ static Advance advance(
     double way = length_of(w->product, s->held, s->n_held, s);
     Advance a = {0.0, NAN, SMOOTH};
     Outlook outlook = clear(bend);
-    while (a.done < 1.0 && !met_new_units(s)) {
+    while (a.done < 1.0 && !has_new_pairs(&s->contacts)) {
         counts[INCREMENTS]++;
         double ahead = increments_next(pace[INCREMENT], a.done, way, pace, &outlook);
         double share = ahead / (1.0 - a.done);
@@ -183,7 +183,7 @@ void equilibrium_path_follow(
             if (!isnan(a.ended)) branch->snapped[p] = a.ended;
         }
         copy(branch->states + p * n, motion, n);
-        if (done < 1.0 || met_new_units(s)) {
+        if (done < 1.0 || has_new_pairs(&s->contacts)) {
             returned[1] = done;
             break;
         }

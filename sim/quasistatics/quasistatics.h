@@ -2,6 +2,7 @@
 #ifndef SIM_QUASISTATICS_H
 #define SIM_QUASISTATICS_H
 
+#include "sim/collision/collision.h"
 #include "sim/core/numbers.h"
 #include "sim/declarations.h"
 
@@ -25,10 +26,6 @@ enum { SMOOTH, LIMIT_POINT, BRANCHING };
 enum { MOST_SNAPS = 64 };
 /* Sweeps of the inverse iteration at a load. */
 enum { SWEEPS_AT_LOADS = 40 };
-
-static inline bool met_new_units(const System *s) {
-    return s->contacts.n_pairs > 0 && s->contacts.cache.found[1] > 0;
-}
 
 /* Length of a step in some dofs, rotations times the scale, mm. */
 static inline double length_of(const double *step, const int64_t *dofs, int64_t n, const System *s) {

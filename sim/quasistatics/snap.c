@@ -123,7 +123,7 @@ bool snap_follow_to_rest(double *motion, const Tolerance *t, const System *s, co
     double near = AT_REST, fastest = 0.0, growth = LONGER;
     int steps = 0;
     EACH(tries, MAX_STEPS) {
-        if (met_new_units(s)) return false;  /* no step is short enough */
+        if (has_new_pairs(&s->contacts)) return false;  /* no step is short enough */
         if (!rodas3(motion, drag, h, s, w, counts)) {
             h *= TOO_LONG;
             growth = 1.0;
