@@ -29,7 +29,7 @@ from sim.vibration import WholeTangent
 
 FIRST_LENGTH, LONGEST, SHORTEST = 0.05, 2.0, 1e-6
 """Arc length of a step, in mm of the root of the summed squares of all dofs."""
-CROOKED = 0.05
+TRAPEZOIDAL_ERROR = 0.05
 """Departure of a step from the trapezoidal rule at most, over its length."""
 CORRECTIONS, FAST = 12, 6
 """Newton steps of a point at most, and those up to which the next step is longer."""
@@ -224,7 +224,7 @@ class ArcLengthPath:
             if (
                 after is None
                 or turned is None
-                or self.crooked(point, after, ahead + turned) > CROOKED
+                or self.trapezoidal_error(point, after, ahead + turned) > TRAPEZOIDAL_ERROR
             ):
                 length *= 0.5
                 continue
@@ -283,8 +283,11 @@ class ArcLengthPath:
         moved = (after.state - begin.state)[self.free] * self.scale
         return np.append(moved, (after.load - begin.load) * self._pace(begin.load))
 
-    def crooked(self, begin: PathPoint, after: PathPoint, mean: Floats) -> float:
-        """Compares a step with the trapezoidal rule along twice the mean of its ends' tangents."""
+    def trapezoidal_error(self, begin: PathPoint, after: PathPoint, mean: Floats) -> float:
+        """Measures the departure of a step from the trapezoidal rule, over its length.
+
+        `mean` (n_free + 1,) is twice the mean of the tangents at its ends.
+        """
         step = self.step(begin, after)
         # x1 - x0 = ds (t0 + t1) / 2
         along = mean / np.linalg.norm(mean)

@@ -25,10 +25,40 @@ enum { SWEEPS = 2 };
 /* Length of numbers without symmetry that are added to the last mode at an output load. */
 static const double SCATTER = 0.5;
 
-static bool settle(double *motion, const Tolerance *t, const System *s, const Workspace *w, int64_t *counts) {
-    return newton_correct(motion, t, false, s, w, counts) && newton_factorise_tangent(motion, s, w, 0.0, counts);
+/* A path as it is followed. */
+typedef struct {
+    double *motion;    /* (n_dofs,) the last equilibrium */
+    double *mode;      /* (n_free,) estimate of the tangent's lowest mode there */
+    double *predicted; /* (n_dofs,) step along the tangent at the start of an increment */
+    double *pace;      /* (4,) see quasistatics.h */
+    Outlook outlook;
+    double way;        /* of the held dofs from the last load to the next, mm */
+    double *load;      /* (n_held,) the next one */
+    bool leaves;       /* goes on by a snap where the path ends */
+    double sense;      /* in which the mode of a branching is followed */
+    const Tolerance *t;
+    const System *s;
+    const Workspace *w;
+    int64_t *counts;
+} Path;
+
+/* Part of the way to a load that is done and at which the path last ended, and how it went on. */
+typedef struct { double done, ended; int kind; } Advance;
+
+/* What an increment comes to: the path goes on, ends, or cannot be followed. */
+typedef enum { GOES_ON, ENDS, STUCK } Outcome;
+
+/* Corrects a predicted state and factorises the tangent there; false if that is indefinite. */
+static bool settle(Path *path) {
+    return newton_correct(path->motion, path->t, false, path->s, path->w, path->counts)
+           && newton_factorise_tangent(path->motion, path->s, path->w, 0.0, path->counts);
 }
 
+static double lowest_eigenvalue(Path *path) {
+    return snap_lowest_mode(path->s, path->w, path->mode, SWEEPS, 0.0);
+}
+
+/* Notes the place of a snap behind those noted before. */
 static void note(double *snaps, double place) {
     EACH(i, MOST_SNAPS) if (isnan(snaps[i])) {
         snaps[i] = place;
@@ -36,7 +66,9 @@ static void note(double *snaps, double place) {
     }
 }
 
-static Outlook clear(double *bend) { return (Outlook){INFINITY, 0, 0.0, {INFINITY, 1.0, bend}}; }
+static void forget(Outlook *outlook) {
+    *outlook = (Outlook){INFINITY, 0, 0.0, {INFINITY, 1.0, outlook->limit.bend}};
+}
 
 static void fail(Outlook *outlook, double place) {
     outlook->wall = place, outlook->limit.distance = INFINITY;
@@ -50,84 +82,108 @@ static void pass(Outlook *outlook, double place, double gone) {
     outlook->failures = 0;
 }
 
-typedef struct { double done, ended; int kind; } Advance;
+/* Keeps an increment that is smooth; the path ends where its tangent is singular. */
+static Outcome accept(Path *path, double gone, double change, bool last, double done) {
+    double *pace = path->pace;
+    pass(&path->outlook, done, gone);
+    double value = lowest_eigenvalue(path);
+    pace[RATE] = (square(value) - square(pace[VALUE])) / most(gone * path->way, 1e-300);
+    pace[VALUE] = value;
+    pace[INCREMENT] = least(1.0, most(last ? pace[INCREMENT] : CLOSE, change * gone));
+    return value > SINGULAR * pace[FIRST] || done == 1.0 ? GOES_ON : ENDS;
+}
 
-/* Follows the path to one load; the workspace holds a factor of the tangent before and after. */
-static Advance advance(
-    double *motion, double *load, int64_t number, bool leaves, double sense, double *pace, double *mode,
-    double *predicted, double *bend, const Tolerance *t, const System *s, const Workspace *w, double *snaps,
-    int64_t *counts) {
-    increments_aim(motion, load, 1.0, s, w);
-    double way = length_of(w->product, s->held, s->n_held, s);
+/* Takes an increment back and shortens the next; the path ends where none is short enough. */
+static Outcome reject(Path *path, double gone, double change, double done) {
+    copy(path->motion, path->w->saved, path->s->n_mass);
+    fail(&path->outlook, done + gone);
+    path->pace[INCREMENT] = least(change, 0.9) * gone;
+    if (newton_factorise_shifted(path->motion, path->s, path->w, path->counts) < 0.0) return STUCK;
+    return path->pace[INCREMENT] >= SMALLEST_INCREMENT ? GOES_ON : ENDS;
+}
+
+/* Predicts and corrects one increment from the part of the way that is done. */
+static Outcome increment(Path *path, double *done) {
+    const System *s = path->s;
+    double *motion = path->motion;
+    path->counts[INCREMENTS]++;
+    double ahead = increments_next(
+        path->pace[INCREMENT], *done, path->way, path->pace, &path->outlook);
+    double share = ahead / (1.0 - *done);
+    double gone = ahead * increments_predict(
+        motion, path->load, share, ahead, &path->outlook.limit, path->predicted, s, path->w,
+        path->counts);
+    if (!(gone >= least(SMALLEST_INCREMENT, ahead))) {
+        copy(motion, path->w->saved, s->n_mass);  /* held units drive a void into its barrier */
+        return STUCK;
+    }
+    bool last = share == 1.0 && gone == ahead;
+    double error = INFINITY;
+    if (settle(path))
+        error = increments_trapezoidal_error(
+            motion, path->predicted, gone, &path->outlook, s, path->w);
+    double change = least(LONGER, most(SHORTER, 0.9 / sqrt(most(error, 1e-300))));
+    if (!(error <= 1.0)) return reject(path, gone, change, *done);
+    *done = last ? 1.0 : *done + gone;
+    return accept(path, gone, change, last, *done);
+}
+
+/* Goes on from the end of the path by damped motion; false if that comes to no rest. */
+static bool leave(Path *path, int64_t number, Advance *a, double *snaps) {
+    int end;
+    double beyond = least(1.0, CLOSE / (1.0 - a->done));
+    double share = path_ends_leave(
+        path->motion, path->load, beyond, path->mode, path->sense, path->pace[FIRST], path->t,
+        path->s, path->w, path->counts, &end);
+    if (share < 0.0) return false;
+    if (end != SMOOTH) {
+        if (a->kind == SMOOTH) a->kind = end;
+        a->ended = a->done;
+        note(snaps, number + a->done);
+    }
+    a->done = share == 1.0 ? 1.0 : a->done + share * (1.0 - a->done);
+    forget(&path->outlook);
+    path->pace[INCREMENT] = RESTART, path->pace[RATE] = 0.0;
+    path->pace[VALUE] = lowest_eigenvalue(path);
+    return true;
+}
+
+/* Follows the path to the next load; the workspace has a factor of the tangent before and after. */
+static Advance advance(Path *path, int64_t number, double *snaps) {
+    increments_aim(path->motion, path->load, 1.0, path->s, path->w);
+    path->way = length_of(path->w->product, path->s->held, path->s->n_held, path->s);
     Advance a = {0.0, NAN, SMOOTH};
-    Outlook outlook = clear(bend);
-    while (a.done < 1.0 && !has_new_pairs(&s->contacts)) {
-        counts[INCREMENTS]++;
-        double ahead = increments_next(pace[INCREMENT], a.done, way, pace, &outlook);
-        double share = ahead / (1.0 - a.done);
-        double gone = ahead * increments_step_ahead(
-            motion, load, share, ahead, &outlook.limit, predicted, s, w, counts);
-        if (!(gone >= least(SMALLEST_INCREMENT, ahead))) {
-            copy(motion, w->saved, s->n_mass);  /* held units drive a void into its barrier */
-            break;
-        }
-        bool last = share == 1.0 && gone == ahead;
-        bool smooth = settle(motion, t, s, w, counts);
-        double crooked = INFINITY;
-        if (smooth) crooked = increments_crookedness(motion, predicted, gone, &outlook, s, w);
-        double change = least(LONGER, most(SHORTER, 0.9 / sqrt(most(crooked, 1e-300))));
-        if (crooked <= 1.0) {
-            a.done = last ? 1.0 : a.done + gone;
-            pass(&outlook, a.done, gone);
-            double value = snap_lowest_mode(s, w, mode, SWEEPS, 0.0);
-            pace[RATE] = (square(value) - square(pace[VALUE])) / most(gone * way, 1e-300);
-            pace[VALUE] = value;
-            pace[INCREMENT] = least(1.0, most(last ? pace[INCREMENT] : CLOSE, change * gone));
-            if (value > SINGULAR * pace[FIRST] || a.done == 1.0) continue;
-        } else {
-            copy(motion, w->saved, s->n_mass);
-            fail(&outlook, a.done + gone);
-            pace[INCREMENT] = least(change, 0.9) * gone;
-            if (newton_factorise_shifted(motion, s, w, counts) < 0.0) break;
-            if (pace[INCREMENT] >= SMALLEST_INCREMENT) continue;
-        }
-        if (!leaves) {
+    forget(&path->outlook);
+    while (a.done < 1.0 && !has_new_pairs(&path->s->contacts)) {
+        Outcome outcome = increment(path, &a.done);
+        if (outcome == STUCK) break;
+        if (outcome == GOES_ON) continue;
+        if (!path->leaves) {
             note(snaps, number + a.done);
             a.kind = LIMIT_POINT, a.ended = a.done;
             return a;
         }
-        int end;
-        double beyond = least(1.0, CLOSE / (1.0 - a.done));
-        share = path_ends_leave(motion, load, beyond, mode, sense, pace[FIRST], t, s, w, counts, &end);
-        if (share < 0.0) break;
-        if (end != SMOOTH) {
-            if (a.kind == SMOOTH) a.kind = end;
-            a.ended = a.done;
-            note(snaps, number + a.done);
-        }
-        a.done = share == 1.0 ? 1.0 : a.done + share * (1.0 - a.done);
-        outlook = clear(bend);
-        pace[INCREMENT] = RESTART, pace[RATE] = 0.0;
-        pace[VALUE] = snap_lowest_mode(s, w, mode, SWEEPS, 0.0);
+        if (!leave(path, number, &a, snaps)) break;
     }
     return a;
 }
 
-/* Goes to a load by a step known from a similar structure; false if that is not smooth. */
-static bool repeat(
-    double *motion, double *load, double *step, const Tolerance *t, const System *s,
-    const Workspace *w, int64_t *counts) {
+/* Goes to the next load by a step known from a similar structure; false if that is not smooth. */
+static bool repeat(Path *path, double *step) {
+    const System *s = path->s;
+    const Workspace *w = path->w;
+    double *motion = path->motion;
     copy(w->saved, motion, s->n_mass);
     if (KEEP_FROM_BARRIER * total_admissible_step(motion, s, step) < 1.0) return false;
     EACH(d, s->n_mass) motion[d] += step[d];
-    EACH(i, s->n_held) motion[s->held[i]] = load[i];
+    EACH(i, s->n_held) motion[s->held[i]] = path->load[i];
     copy(w->guess, motion, s->n_mass);
-    bool smooth = settle(motion, t, s, w, counts);
+    bool smooth = settle(path);
     EACH(d, s->n_mass) w->guess[d] = motion[d] - w->guess[d];
     double limit = SHORT * length_of(step, s->dofs, s->n_dofs, s);
     if (!(smooth && length_of(w->guess, s->dofs, s->n_dofs, s) <= limit)) {
         copy(motion, w->saved, s->n_mass);
-        newton_factorise_shifted(motion, s, w, counts);
+        newton_factorise_shifted(motion, s, w, path->counts);
         return false;
     }
     return true;
@@ -135,17 +191,19 @@ static bool repeat(
 
 /* Begins a path in the unloaded structure, or goes on from the last of `known` loads; returns the
    smallest eigenvalue there, negative if there is no equilibrium. */
-static double begin(
-    double *motion, double *mode, double sense, int64_t known, double *pace, const Branch *branch,
-    const Tolerance *t, const System *s, const Workspace *w, int64_t *counts) {
+static double begin(Path *path, int64_t known, const Branch *branch) {
+    const System *s = path->s;
+    const Workspace *w = path->w;
+    double *pace = path->pace;
     if (known > 0) {
-        copy(motion, branch->states + (known - 1) * s->n_mass, s->n_mass);
-        newton_factorise_tangent(motion, s, w, 0.0, counts);
-        path_ends_scatter(mode, s->n_dofs);
-        return pace[VALUE] = snap_lowest_mode(s, w, mode, SWEEPS_AT_LOADS, EIGENVALUE);
+        copy(path->motion, branch->states + (known - 1) * s->n_mass, s->n_mass);
+        newton_factorise_tangent(path->motion, s, w, 0.0, path->counts);
+        path_ends_scatter(path->mode, s->n_dofs);
+        return pace[VALUE] = snap_lowest_mode(s, w, path->mode, SWEEPS_AT_LOADS, EIGENVALUE);
     }
     int end;
-    double first = path_ends_come_to_rest(motion, mode, sense, t, s, w, counts, &end);
+    double first = path_ends_come_to_rest(
+        path->motion, path->mode, path->sense, path->t, s, w, path->counts, &end);
     if (first < 0.0) return first;
     if (end != SMOOTH) branch->jumped[0] = end, branch->snapped[0] = branch->snaps[0] = 0.0;
     return pace[VALUE] = pace[FIRST] = first;
@@ -155,28 +213,31 @@ void equilibrium_path_follow(
     double *loads, int64_t known, double *pace, double *bends, int64_t *trusted, bool leaves,
     double sense, const System *s, const Workspace *w, double relative, double absolute,
     double *drag, const Branch *branch, int64_t *counts, int64_t n_loads, double *returned) {
-    Tolerance tolerance = {relative, absolute, drag}, *t = &tolerance;
+    Tolerance tolerance = {relative, absolute, drag};
     int64_t n = s->n_mass, p = known;
     double *motion = calloc(3 * n + s->n_dofs, sizeof(double));
     double *step = motion + n, *bend = step + n, *mode = bend + n;
+    Path path = {
+        .motion = motion, .mode = mode, .predicted = step, .pace = pace, .outlook.limit.bend = bend,
+        .leaves = leaves, .sense = sense, .t = &tolerance, .s = s, .w = w, .counts = counts};
     returned[0] = returned[1] = 0.0;
-    if (begin(motion, mode, sense, known, pace, branch, t, s, w, counts) < 0.0 && known == 0) {
+    if (begin(&path, known, branch) < 0.0 && known == 0) {
         free(motion);
         return;
     }
     pace[INCREMENT] = 1.0, pace[RATE] = 0.0;
     for (; p < n_loads; p++) {
-        double *load = loads + p * s->n_held, done = 0.0;
-        increments_aim(motion, load, 1.0, s, w);
+        double done = 0.0;
+        path.load = loads + p * s->n_held;
+        increments_aim(motion, path.load, 1.0, s, w);
         increments_tangent_step(motion, s, w);
         copy(branch->tangents + p * n, w->step, n);
         if (trusted[p]) {
             EACH(d, n) step[d] = w->step[d] + bends[p * n + d];
-            if (repeat(motion, load, step, t, s, w, counts)) done = 1.0, pace[RATE] = 0.0;
+            if (repeat(&path, step)) done = 1.0, pace[RATE] = 0.0;
         }
         if (done < 1.0) {
-            Advance a = advance(
-                motion, load, p, leaves, sense, pace, mode, step, bend, t, s, w, branch->snaps, counts);
+            Advance a = advance(&path, p, branch->snaps);
             done = a.done;
             if (branch->jumped[p] == SMOOTH) branch->jumped[p] = a.kind;
             /* that of coming to rest stays where the way is smooth */

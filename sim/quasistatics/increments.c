@@ -3,11 +3,12 @@
 
 /* Departure of a smooth increment from the trapezoidal rule at most, over its length and in mm, and
    the part of it by which a limit point is noticed. */
-static const double CROOKED = 0.05, CROOKED_LENGTH = 1e-5, NOTICED = 0.01;
+static const double TRAPEZOIDAL = 0.05, TRAPEZOIDAL_FLOOR = 1e-5, NOTICED = 0.01;
 /* Newton steps at most by which an increment goes on where the barrier cuts its first step. */
 enum { STEPS_AHEAD = 6 };
 /* Part of the way to where the eigenvalue is expected to vanish that an increment goes at most: of a
-   stiff structure, and of a soft one that no limit point is in sight of, as more is too crooked. */
+   stiff structure, and of a soft one that no limit point is in sight of, as more would depart too
+   far from the trapezoidal rule. */
 static const double STIFF_PART = 0.75, SOFT_PART = 0.5;
 /* Eigenvalue over the first state's up to which a structure is soft. */
 static const double SOFT = 0.5;
@@ -16,6 +17,7 @@ static const double SOFT = 0.5;
 enum { STUBBORN = 3 };
 static const double LIMIT_PART = 0.75, WALL_PART = 0.5;
 
+/* Fills `step` with the motion along the path's tangent while the held dofs move by `product`. */
 void increments_tangent_step(double *motion, const System *s, const Workspace *w) {
     /* K_ff du_f = -K_fh du_h */
     total_locate(motion, s, &w->kinematics);
@@ -24,14 +26,15 @@ void increments_tangent_step(double *motion, const System *s, const Workspace *w
     EACH(i, s->n_held) w->step[s->held[i]] = w->product[s->held[i]];
 }
 
+/* Fills `product` with a share of the held dofs' way to a load. */
 void increments_aim(double *motion, double *load, double share, const System *s, const Workspace *w) {
     memset(w->product, 0, sizeof(double) * s->n_mass);
     EACH(i, s->n_held) w->product[s->held[i]] = (load[i] - motion[s->held[i]]) * share;
 }
 
-/* Compares the way from `saved` with the trapezoidal rule, fitted to the limit point that is in
-   sight; 1 is the most there may be. Locates one behind a wall. */
-double increments_crookedness(
+/* Departure of the increment from `saved` from the trapezoidal rule, fitted to the limit point that
+   is in sight, over the one allowed. Locates a limit point behind a wall. */
+double increments_trapezoidal_error(
     double *motion, double *predicted, double gone, Outlook *outlook, const System *s,
     const Workspace *w) {
     memset(w->product, 0, sizeof(double) * s->n_mass);
@@ -42,7 +45,8 @@ double increments_crookedness(
     double r = limit_point_ratio(limit, gone);
     EACH(d, s->n_mass) w->trial[d] = motion[d] - w->saved[d];
     EACH(d, s->n_mass) w->product[d] = w->trial[d] - (predicted[d] + r * w->step[d]) / (1.0 + r);
-    double allowed = most(CROOKED * length_of(w->trial, s->dofs, s->n_dofs, s), CROOKED_LENGTH);
+    double allowed = most(
+        TRAPEZOIDAL * length_of(w->trial, s->dofs, s->n_dofs, s), TRAPEZOIDAL_FLOOR);
     if (outlook->failures >= STUBBORN)
         limit_point_locate(predicted, gone, NOTICED * allowed, limit, s, w);
     return length_of(w->product, s->dofs, s->n_dofs, s) / allowed;
@@ -65,7 +69,8 @@ double increments_next(
     return least(next, most(part * expected, SMALLEST_INCREMENT));
 }
 
-static void newton_ahead(double *motion, const System *s, const Workspace *w) {
+/* Fills `step` with a Newton step of the free dofs while the held ones move by `product`. */
+static void newton_step_ahead(double *motion, const System *s, const Workspace *w) {
     /* K_ff du_f = -(r_f + K_fh du_h) */
     double energy[2];
     total_gradient(motion, s, &w->kinematics, w->force, energy);
@@ -76,8 +81,9 @@ static void newton_ahead(double *motion, const System *s, const Workspace *w) {
     EACH(i, s->n_held) w->step[s->held[i]] = w->product[s->held[i]];
 }
 
-/* Moves by a share of the way to a load short of the barrier; returns the part of it gone. */
-double increments_step_ahead(
+/* Predictor of an increment: moves along the tangent by a share of the way to a load, short of the
+   barrier; where that cuts it, Newton steps go on. Returns the part of the share gone. */
+double increments_predict(
     double *motion, double *load, double share, double ahead, const LimitPoint *limit,
     double *predicted, const System *s, const Workspace *w, int64_t *counts) {
     copy(w->saved, motion, s->n_mass);
@@ -90,7 +96,7 @@ double increments_step_ahead(
     EACH(tries, STEPS_AHEAD) {
         if (gone == 1.0 || !newton_factorise_tangent(motion, s, w, 0.0, counts)) break;
         increments_aim(motion, load, share * (1.0 - gone) / (1.0 - share * gone), s, w);
-        newton_ahead(motion, s, w);
+        newton_step_ahead(motion, s, w);
         double allowed = least(1.0, KEEP_FROM_BARRIER * total_admissible_step(motion, s, w->step));
         EACH(d, s->n_mass) motion[d] += allowed * w->step[d];
         gone = allowed == 1.0 ? 1.0 : gone + allowed * (1.0 - gone);

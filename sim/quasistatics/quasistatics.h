@@ -79,12 +79,12 @@ bool snap_follow_to_rest(
 void increments_tangent_step(double *motion, const System *s, const Workspace *w);
 void increments_aim(
     double *motion, double *load, double share, const System *s, const Workspace *w);
-double increments_crookedness(
+double increments_trapezoidal_error(
     double *motion, double *predicted, double gone, Outlook *outlook, const System *s,
     const Workspace *w);
 double increments_next(
     double increment, double done, double way, const double *pace, const Outlook *outlook);
-double increments_step_ahead(
+double increments_predict(
     double *motion, double *load, double share, double ahead, const LimitPoint *limit,
     double *predicted, const System *s, const Workspace *w, int64_t *counts);
 
