@@ -42,9 +42,9 @@ from .simulation import cases_of as cases_of
 from .simulation import mimicking as mimicking
 from .simulation import simulate as simulate
 from .simulation import target_motion as target_motion
-from .soundness import SceneError as SceneError
-from .soundness import check_scene as check_scene
 from .time_solver import NEWTON as NEWTON
 from .time_solver import STIFFENING as STIFFENING
 from .time_solver import TURN_ALLOWANCE as TURN_ALLOWANCE
+from .validation import SceneError as SceneError
+from .validation import check_scene as check_scene
 from .warm_starts import Paths as Paths

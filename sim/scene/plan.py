@@ -11,8 +11,8 @@ from sim.quasistatics import StaticSolver
 from sim.scene.equal_cases import equal_cases
 from sim.scene.parameter_map import concrete_parameters
 from sim.scene.scene import Scene
-from sim.scene.soundness import check_scene
 from sim.scene.time_solver import time_solver
+from sim.scene.validation import check_scene
 from sim.solvers import Solver, check_free_dofs
 from sim.structure import ConcreteParameters
 from sim.time_integration import ImplicitSolver

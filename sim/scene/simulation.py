@@ -26,7 +26,7 @@ from sim.scene.objectives import (
 from sim.scene.parameter_map import concrete_parameters, parameters_of_design
 from sim.scene.plan import Plan, make_plan, sample_times
 from sim.scene.scene import Scene
-from sim.scene.soundness import SceneError, check_cases, check_units
+from sim.scene.validation import SceneError, check_cases, check_units
 from sim.solvers import Case, Solver, concrete, differentiable_motion, solve_cases
 from sim.structure import Parameters
 from sim.time_integration import simpson_weights

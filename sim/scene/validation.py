@@ -1,4 +1,4 @@
-"""Checks that a scene has a meaning: refuses what has none, and warns of what may be meant."""
+"""Validates a scene: refuses impossible geometry, supports or drives; warns of doubtful ones."""
 
 import logging
 import os
