@@ -1,7 +1,8 @@
 """Decides what a scene needs and what it may skip: once, printed, and stored with results."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -15,7 +16,9 @@ from sim.scene.time_solver import time_solver
 from sim.scene.validation import check_scene
 from sim.solvers import Solver, check_free_dofs
 from sim.structure import ConcreteParameters
-from sim.time_integration import ImplicitSolver
+from sim.time_integration import ExplicitSolver, ImplicitSolver
+
+Integrator: TypeAlias = Literal["static", "implicit", "explicit"]
 
 CONFIRMING = 4
 """Loads passed for each of the loss where its loads alone are known."""
@@ -25,7 +28,7 @@ CONFIRMING = 4
 class Plan:
     """Holds the decisions for one scene."""
 
-    integrator: Literal["static", "implicit", "explicit"]  # how the response is computed
+    integrator: Integrator  # how the response is computed
     solver: Solver  # ready to use
     case_of: Ints  # (n_cases,) the simulated case that each load case takes its loss from
     decisions: tuple[str, ...]  # one line for each thing decided
@@ -91,40 +94,60 @@ def make_plan(
     warnings = list(check_scene(scene, structure, times))
     check_free_dofs(scene.topology)
     values = concrete_parameters(scene, structure)
-    decisions: list[str] = []
-    skipped = [_reference_line(scene)] if vertices is None else []
-
+    case_of = np.arange(len(scene.loads.cases))
     symmetric = scene.design.symmetry == "C4" and scene.design.copies is None
-    may_repeat = not every_case and (vertices is not None or symmetric)
-    every = np.arange(len(scene.loads.cases))
-    case_of = equal_cases(scene, structure, values) if may_repeat else every
-    if copies := int((case_of != every).sum()):
-        skipped.append(f"{copies} of {len(every)} load cases: copies turned by 90 deg")
-    n_designed, n_ligaments = len(scene.topology.designed), scene.lattice.n_ligaments
-    if vertices is None and n_designed < n_ligaments:
-        skipped.append(
-            f"parameter derivatives of {n_ligaments - n_designed} of {n_ligaments} ligaments: the"
-            " design does not move them"
-        )
+    if not every_case and (vertices is not None or symmetric):
+        case_of = equal_cases(scene, structure, values)
+    decisions: list[str] = []
     solver: Solver
     if scene.loads.static:
-        integrator: Literal["static", "implicit", "explicit"] = "static"
         top = scene.topology if gradient else replace(scene.topology, storages=FASTEST)
         solver = StaticSolver(top, times, threads=threads, continues=not gradient)
         decisions.append(f"tangent: {top.numbering[1].describe()}")
-        skipped.append("inertia and damping: the scene is static")
     else:
         solver = time_solver(scene, values, times, threads, decisions, warnings, gradient)
-        integrator = "implicit" if isinstance(solver, ImplicitSolver) else "explicit"
-        if isinstance(solver, ImplicitSolver):
-            skipped.append(_contact_line(values, solver))
-            if not gradient:
-                skipped.append(f"accuracy for a gradient: stages to {solver.tolerance:.1g} mm/s")
-        elif vertices is None:
-            megabytes = solver.adjoint_memory() / 1e6
-            decisions.append(f"adjoint: checkpoints, {megabytes:.0f} MB a case")
-    decisions.insert(0, f"integrator: {integrator}")
-    return Plan(integrator, solver, case_of, tuple(decisions), tuple(skipped), tuple(warnings))
+    if isinstance(solver, ExplicitSolver) and vertices is None:
+        megabytes = solver.adjoint_memory() / 1e6
+        decisions.append(f"adjoint: checkpoints, {megabytes:.0f} MB a case")
+    integrator = _integrator(solver)
+    skipped = (
+        *([_reference_line(scene)] if vertices is None else []),
+        *_repeated_cases(case_of),
+        *(_fixed_ligaments(scene) if vertices is None else []),
+        *_skipped_by(solver, values, gradient),
+    )
+    told = (f"integrator: {integrator}", *decisions)
+    return Plan(integrator, solver, case_of, told, skipped, tuple(warnings))
+
+
+def _integrator(solver: Solver) -> Integrator:
+    if isinstance(solver, StaticSolver):
+        return "static"
+    return "implicit" if isinstance(solver, ImplicitSolver) else "explicit"
+
+
+def _repeated_cases(case_of: Ints) -> Iterator[str]:
+    if copies := int((case_of != np.arange(len(case_of))).sum()):
+        yield f"{copies} of {len(case_of)} load cases: copies turned by 90 deg"
+
+
+def _fixed_ligaments(scene: Scene) -> Iterator[str]:
+    n_designed, n_ligaments = len(scene.topology.designed), scene.lattice.n_ligaments
+    if n_designed < n_ligaments:
+        yield (
+            f"parameter derivatives of {n_ligaments - n_designed} of {n_ligaments} ligaments: the"
+            " design does not move them"
+        )
+
+
+def _skipped_by(solver: Solver, values: ConcreteParameters, gradient: bool) -> Iterator[str]:
+    """Lists what the solver of a scene leaves out, a line each."""
+    if isinstance(solver, StaticSolver):
+        yield "inertia and damping: the scene is static"
+    if isinstance(solver, ImplicitSolver):
+        yield _contact_line(values, solver)
+        if not gradient:
+            yield f"accuracy for a gradient: stages to {solver.tolerance:.1g} mm/s"
 
 
 def _reference_line(scene: Scene) -> str:
