@@ -1,10 +1,10 @@
 from .exchange import FamilyOptions as FamilyOptions
 from .exchange import minimise_worst as minimise_worst
-from .family_losses import LoadFamily as LoadFamily
+from .family import LoadFamily as LoadFamily
+from .family import LoadSetup as LoadSetup
+from .family import directed as directed
+from .family import polar as polar
 from .family_losses import LoadLosses as LoadLosses
-from .family_losses import LoadSetup as LoadSetup
-from .family_losses import directed as directed
-from .family_losses import polar as polar
 from .worst_load import FoundLoad as FoundLoad
 from .worst_load import SearchOptions as SearchOptions
 from .worst_load import ascend as ascend

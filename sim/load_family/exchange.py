@@ -9,6 +9,7 @@ semi-infinite programme, solved by exchange: Hettich and Kortanek 1993, SIAM Rev
 import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,7 +17,8 @@ import numpy as np
 
 from sim.constraints import Limits
 from sim.core import Floats
-from sim.load_family.family_losses import LoadFamily, LoadLosses
+from sim.load_family.family import LoadFamily
+from sim.load_family.family_losses import LoadLosses
 from sim.load_family.worst_load import APART, FoundLoad, SearchOptions, search_worst
 from sim.optimise import Evaluate, Evaluation, Journal, Result, SqpOptions
 from sim.optimise import minimise as minimise_loss
@@ -175,7 +177,7 @@ def minimise_worst(
     constraints = constraints_of(scene, make_plan(scene), limits, journal)
     x = np.zeros(scene.space.n_variables) if start is None else start
     history: list[Evaluation] = []
-    best: tuple[float, bool, Result] | None = None
+    best: _Best | None = None
 
     def record(evaluation: Evaluation) -> None:
         history.append(replace(evaluation, number=len(history)))
@@ -186,10 +188,7 @@ def minimise_worst(
     stands = False
     while (left := sqp.evaluations - len(history)) > 0:
         first = len(history)
-        # new starts from inside the feasible set are for a set that stands for the family
-        brief = replace(sqp, evaluations=min(left, options.evaluations), retreats=0)
-        longer = replace(sqp, evaluations=min(left, RESTARTS * options.evaluations))
-        descent = longer if stands else brief
+        descent = _descent_options(sqp, options, left, stands)
         result = minimise_loss("sqp", evaluate, constraints, x, options=descent, callback=record)
         x, known = result.x, float(result.aux.max())
         found = search(x, held.places)
@@ -198,14 +197,33 @@ def minimise_worst(
         worst, mean = max(known, found[0].loss), float(scene.loads.case_weights @ own)
         merit = (1 - options.nominal) * worst + options.nominal * mean
         stands = found[0].loss <= FOUND * known
-        if best is None or merit < best[0]:
-            best = merit, stands, replace(result, best=first + result.best)
+        if best is None or merit < best.merit:
+            best = _Best(merit, stands, replace(result, best=first + result.best))
         held.exchange(added, found)
     assert best is not None
-    _, stood, result = best
-    if not stood:
+    if not best.stands:
         LOG.warning("the worst load found is more than %g times those designed for", FOUND)
-    return replace(result, evaluations=tuple(history))
+    return replace(best.result, evaluations=tuple(history))
+
+
+class _Best(NamedTuple):
+    """Holds the design of the lowest worst loss so far."""
+
+    merit: float  # that loss, with the share of the drive's own loads
+    stands: bool  # whether no load was found that is much worse than those in the set
+    result: Result
+
+
+def _descent_options(
+    sqp: SqpOptions, options: FamilyOptions, left: int, stands: bool
+) -> SqpOptions:
+    """Bounds a descent for the set by the evaluations left; a longer one for a set that stands.
+
+    New starts from inside the feasible set are for a set that stands for the family.
+    """
+    if stands:
+        return replace(sqp, evaluations=min(left, RESTARTS * options.evaluations))
+    return replace(sqp, evaluations=min(left, options.evaluations), retreats=0)
 
 
 def without_copies(family: LoadFamily, scene: Scene) -> LoadFamily:

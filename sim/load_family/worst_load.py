@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.core import Floats, SimulationError
-from sim.load_family.family_losses import LoadFamily
+from sim.load_family.family import LoadFamily
 
 LOG = logging.getLogger(__name__)
 
