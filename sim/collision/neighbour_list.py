@@ -18,4 +18,4 @@ def find(motion: Floats, contacts: ContactArrays) -> int:
 
 @compiled
 def pairs_in_contact(motion: Floats, contacts: ContactArrays) -> int:
-    """Number of pairs of units nearer than the activation distance in a state (n_dofs,)."""
+    """Counts the pairs of units nearer than the activation distance in a state (n_dofs,)."""

@@ -1,4 +1,4 @@
-"""Outlines of units in a state: where they are, how near two come, and whether they cross."""
+"""Places the outlines of units in a state: how near two come, and whether they cross."""
 
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ class NeighbourCache(NamedTuple):
 
 
 class ContactArrays(NamedTuple):
-    """Units that may meet, as the kernels take them; without pairs there is no contact."""
+    """Holds units that may meet, as the kernels take them; without pairs there is no contact."""
 
     pairs: Ints  # (n_pairs, 2) units, ascending, whose coupling the tangent has room for
     first: Ints  # (n_units + 1,) start of each polygon in the vertices

@@ -9,4 +9,4 @@ FAR = 1.2
 
 @compiled
 def collision_free_step(motion: Floats, contacts: ContactArrays, step: Floats) -> float:
-    """Multiple of ``step`` (n_dofs,) up to which no two units meet; inf if beyond FAR."""
+    """Finds the multiple of ``step`` (n_dofs,) up to which no two units meet; inf if beyond FAR."""

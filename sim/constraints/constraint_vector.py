@@ -29,7 +29,7 @@ from sim.structure import DesignSpace
 
 @dataclass(frozen=True)
 class ConstraintVector:
-    """All requirements on a design as one vector function ``c(x) >= 0``, in mm."""
+    """Evaluates all requirements on a design as one vector function ``c(x) >= 0``, in mm."""
 
     space: DesignSpace
     limits: Limits

@@ -98,7 +98,7 @@ def _outward(ring: Array) -> Array:
 
 @dataclass(frozen=True)
 class ConstraintKind:
-    """One kind of requirement: ``sign * (measure - limit) >= 0`` at every place."""
+    """Describes one kind of requirement: ``sign * (measure - limit) >= 0`` at every place."""
 
     name: str  # as in the reports
     unit: str  # of the measure and its margin
@@ -125,7 +125,7 @@ class ConstraintKind:
 
 @dataclass(frozen=True)
 class Margin:
-    """Smallest margin of one kind of requirement."""
+    """Holds the smallest margin of one kind of requirement."""
 
     # edge_length, block_angle, convexity, void_angle, gap, slot_angle, slot_wall, slot_gap or
     # slot_turn

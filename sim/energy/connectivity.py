@@ -123,17 +123,17 @@ class Topology:
         return np.append(np.tile(of_unit, self.n_units), np.tile(of_load, len(self.loaded)))
 
     def smallest_void_angle(self, void: Floats, motion: Floats) -> Floats:
-        """Smallest void angle (...) of states ``motion`` (..., n_units, 3), rad."""
+        """Computes the smallest void angle (...) of states ``motion`` (..., n_units, 3), rad."""
         return self.smallest_void_angles(void, motion).min(axis=-1)
 
     def smallest_void_angles(self, void: Floats, motion: Floats) -> Floats:
-        """Smaller void angle (..., n_ligaments) of each ligament, rad."""
+        """Computes the smaller void angle (..., n_ligaments) of each ligament, rad."""
         a, b = self.ligament_units.T
         turned = motion[..., a, 2] - motion[..., b, 2]
         return np.minimum(void[:, 0] + turned, void[:, 1] - turned)
 
     def closest_void_angles(self, void: Floats, motion: Floats) -> Floats:
-        """Smallest void angle (n_ligaments,) of each ligament in (n_states, n_units, 3), rad."""
+        """Finds the smallest void angle (n_ligaments,) in states (n_states, n_units, 3), rad."""
         turn = np.ascontiguousarray(motion[..., 2].T)
         a, b = self.ligament_units.T
         turned = turn[a] - turn[b]

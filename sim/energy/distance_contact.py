@@ -22,7 +22,7 @@ from sim.energy.ligament import rotate
 
 
 class DistanceLaw(NamedTuple):
-    """Contact of two units on their distance."""
+    """Describes contact of two units on their distance."""
 
     # scale of the barrier, N mm: k (distance / ligament length)^2 with the contact stiffness k of
     # the angle law (N mm/rad^2), since a void that closes by an angle moves its sides by that times
@@ -39,26 +39,26 @@ class UnitOutline(NamedTuple):
 
 
 def barrier(square: Array, law: DistanceLaw) -> Array:
-    """Energy at a squared distance (mm^2): energy (1 - q)^3 / q, q = square / distance^2."""
+    """Computes energy (1 - q)^3 / q at a squared distance (mm^2), with q = square / distance^2."""
     q = jnp.minimum(square / law.distance**2, 1.0)
     return law.energy * (1.0 - q) ** 3 / q
 
 
 def fade(length: Array, law: DistanceLaw) -> Array:
-    """Weight of an edge at a length (mm) from its end: from 0 to 1 over the distance, quintic."""
+    """Weighs an edge at a length (mm) from its end: from 0 to 1 over the distance, quintic."""
     x = jnp.clip(length / law.distance, 0.0, 1.0)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
 
 def vertices_energy(one: Array, other: Array, law: DistanceLaw) -> Array:
-    """Energy between two vertices (2,), N mm."""
+    """Computes the energy between two vertices (2,), N mm."""
     return barrier(jnp.sum((one - other) ** 2), law)
 
 
 def edge_energy(vertex: Array, start: Array, end: Array, law: DistanceLaw) -> Array:
-    """Energy between a vertex (2,) and an edge of a polygon that lies to the left of it, N mm.
+    """Computes the energy between a vertex (2,) and an edge, its polygon on the left, N mm.
 
-    None on the inner side: a vertex gets there from beyond another edge only.
+    It is zero on the inner side: a vertex gets there from beyond another edge only.
     """
     edge, offset = end - start, vertex - start
     length = jnp.linalg.norm(edge)
@@ -79,7 +79,7 @@ def placed(motion: Array, polygon: UnitOutline) -> Array:
 def pair_energy(
     motion_a: Array, motion_b: Array, a: UnitOutline, b: UnitOutline, law: DistanceLaw
 ) -> Array:
-    """Contact energy of two units that do not overlap, N mm.
+    """Computes the contact energy of two units that do not overlap, N mm.
 
     Motions (3,) are displacement (mm) and rotation (rad); vertices of the units are counter-
     clockwise.
@@ -96,7 +96,7 @@ def _edges(vertices: Array, ring: Array, law: DistanceLaw) -> Array:
 
 
 def activation_distance(ligament_length: float, gap: float | None = None) -> float:
-    """Default activation distance: a twelfth of the ligaments' length, or the smallest gap, mm.
+    """Returns the default activation distance: a twelfth of a ligament, or the smallest gap, mm.
 
     Units of a design that keeps a ``gap`` above zero do not push each other at rest; and the ends
     of a ligament, joined but not in contact, are far beyond it.

@@ -1,4 +1,4 @@
-"""Contact of units on their distance: energy, gradient, tangent, mixed derivatives."""
+"""Computes contact of units on their distance: energy, gradient, tangent, mixed derivatives."""
 
 from sim.collision import ContactArrays
 from sim.core import Floats, Ints, compiled

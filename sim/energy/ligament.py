@@ -26,7 +26,7 @@ def rotate(vector: Array, angle: Array) -> Array:
 
 
 class LigamentStrain(NamedTuple):
-    """Deformation of a ligament: stretch (mm), shear angle and relative rotation (rad)."""
+    """Holds the strain of a ligament: stretch (mm), shear angle and relative rotation (rad)."""
 
     stretch: Array
     shear: Array
@@ -36,7 +36,7 @@ class LigamentStrain(NamedTuple):
 def ligament_strain(
     motion_a: Array, motion_b: Array, arm_a: Array, arm_b: Array, vector: Array
 ) -> LigamentStrain:
-    """Deformation of one ligament in large rotation.
+    """Computes the strain of one ligament in large rotation.
 
     Args:
         motion_a: (3,) displacement (mm) and rotation (rad) of the first unit.
@@ -70,7 +70,7 @@ def ligament_energy(
     law: LigamentLaw,
     natural: Array | Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Array:
-    """Strain energy of one ligament of the given law, N mm; see ``ligament_strain``.
+    """Computes the strain energy of one ligament of the given law, N mm; see ``ligament_strain``.
 
     It is zero at the ``natural`` (3,) stretch (mm), shear angle and relative rotation (rad).
     """

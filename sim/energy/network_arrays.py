@@ -1,4 +1,4 @@
-"""Arrays of one structure as the compiled kernels take them, and derivatives by them."""
+"""Lays out arrays of one structure as the compiled kernels take them, and derivatives by them."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from sim.core import Floats, Ints
 
 
 class NetworkArrays(NamedTuple):
-    """Arrays of one structure as the kernels take them."""
+    """Holds the arrays of one structure as the kernels take them."""
 
     unit: Ints  # (n_ligaments, 2) units that each ligament joins
     arm: Floats  # (n_ligaments, 2, 2) arm of either end, mm
@@ -29,7 +29,7 @@ class Kinematics(NamedTuple):
 
 
 class Sensitivity(NamedTuple):
-    """Derivatives with respect to a network's parameters, shaped as in ``NetworkArrays``."""
+    """Holds derivatives with respect to a network's parameters, shaped as in ``NetworkArrays``."""
 
     # arm, vector, void, law, natural: as there
     arm: Floats

@@ -90,7 +90,7 @@ def system_of(
 
 
 def empty_bars(system: System, drive_shape: tuple[int, ...]) -> Bars:
-    """Zeros to add derivatives to."""
+    """Makes zeros to add derivatives to."""
     zero = np.zeros_like(system.mass)
     sensitivity = no_sensitivity(system.net, system.contacts)
     return Bars(sensitivity, zero, zero.copy(), np.zeros(drive_shape))

@@ -53,4 +53,4 @@ def mixed(
 
 @compiled
 def admissible_step(motion: Floats, system: System, step: Floats) -> float:
-    """Largest multiple of ``step`` (n_dofs,) up to which all states are admissible."""
+    """Finds the largest multiple of ``step`` (n_dofs,) up to which all states are admissible."""

@@ -7,7 +7,7 @@ from jax import Array
 
 
 class ContactLaw(NamedTuple):
-    """Contact of two units on the void angle: N mm/rad^2, rad, rad."""
+    """Describes contact of two units on the void angle: N mm/rad^2, rad, rad."""
 
     stiffness: float | Array
     barrier: float | Array
@@ -15,7 +15,7 @@ class ContactLaw(NamedTuple):
 
 
 def contact_energy(void_angle: float | Array, law: ContactLaw) -> Array:
-    """Energy of one void that closes below the cutoff, infinite at the barrier, N mm.
+    """Computes the energy of one void that closes below the cutoff, infinite at the barrier, N mm.
 
     With x = (angle - cutoff) / (cutoff - barrier) it is k/4 (cutoff - barrier)^2 (1/(x+1) - 1/(x-1)
     - 2), which is k/2 (angle - cutoff)^2 / (1 - x^2). Beyond the barrier the authors' law is
@@ -29,6 +29,6 @@ def contact_energy(void_angle: float | Array, law: ContactLaw) -> Array:
 
 
 def contact_void_angles(void_angle: Array, rotation_a: Array, rotation_b: Array) -> Array:
-    """Current void angles (2,) of a ligament; exact, since the units are rigid."""
+    """Computes the current void angles (2,) of a ligament; exact, since the units are rigid."""
     turn = rotation_a - rotation_b
     return void_angle + jnp.array([turn, -turn])

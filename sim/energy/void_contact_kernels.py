@@ -1,4 +1,4 @@
-"""Contact on the angle of the voids: energy, gradient, tangent, mixed derivatives."""
+"""Computes contact on the angle of the voids: energy, gradient, tangent, mixed derivatives."""
 
 from sim.core import Floats, Ints, compiled
 from sim.energy.network_arrays import NetworkArrays, Sensitivity
@@ -7,7 +7,7 @@ from sim.linalg import Matrix
 
 @compiled
 def void_slopes(net: NetworkArrays, k: int, side: int, turn: float) -> tuple[float, float, float]:
-    """Energy of one void and its first two derivatives by the turn; infinite past the barrier."""
+    """Computes one void's energy, infinite past the barrier, and two derivatives by the turn."""
 
 
 @compiled
@@ -39,4 +39,4 @@ def add_mixed(
 
 @compiled
 def barrier_step(motion: Floats, net: NetworkArrays, step: Floats) -> float:
-    """Largest multiple of ``step`` (3 n_units,) before a void reaches its barrier; exact."""
+    """Finds the multiple of ``step`` (3 n_units,) at which a void reaches its barrier; exact."""

@@ -1,4 +1,4 @@
-"""Nested dissection: an order of the dofs in which a sparse Cholesky factor fills little.
+"""Orders the dofs by nested dissection, so that a sparse Cholesky factor fills little.
 
 A network is cut in two along a straight line by the units next to it, and so on; the units of a cut
 come after those of both sides. Each cut, and each part too small to be cut, is a front: its dofs

@@ -1,4 +1,4 @@
-"""Cholesky factor by panels of four columns, each as long as its columns reach (a skyline).
+"""Lays out a Cholesky factor by panels of four columns, each as long as these reach (a skyline).
 
 Ordered by reverse Cuthill-McKee, the columns of a lattice of n by n units reach as far as a
 diagonal of it is long, on average half as far as in a band of rows, and a factor takes half as many

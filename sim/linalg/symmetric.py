@@ -28,7 +28,7 @@ BY_FRONTS, BY_PANELS = -1, -2
 
 
 class Pattern(NamedTuple):
-    """Layout of the entries."""
+    """Describes the layout of the entries."""
 
     size: Ints  # (2,) number of dofs, and half bandwidth; BY_FRONTS or BY_PANELS if so stored
     fronts: Fronts  # none if stored otherwise
@@ -67,7 +67,7 @@ class Pattern(NamedTuple):
 
 
 class Matrix(NamedTuple):
-    """A symmetric matrix, or its Cholesky factor."""
+    """Holds a symmetric matrix, or its Cholesky factor."""
 
     values: Floats  # (n_values,) lower half; of a band column by column
     scratch: Floats  # of the factorisation by fronts, or of the solution by panels

@@ -112,7 +112,7 @@ class LoadSet:
         return np.concatenate([self.own, self.added])
 
     def __call__(self, design: Floats) -> tuple[float, Floats, Floats]:
-        """Value, gradient (n_variables,) and losses (n_cases + n_added,) of a design."""
+        """Computes value, gradient (n_variables,) and losses (n_cases + n_added,) of a design."""
         found = [self._losses(design, place) for place in self.places]
         each = np.array([one.value for one in found])
         value, share = self._value(jnp.asarray(each))

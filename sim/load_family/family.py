@@ -41,7 +41,7 @@ class LoadSetup:
         return float(polar(self.motion)[1])
 
     def numbers(self, place: Numbers) -> Array:
-        """Direction (rad), amplitude (mm) and frequency (Hz) at places (..., n)."""
+        """Computes direction (rad), amplitude (mm) and frequency (Hz) at places (..., n)."""
         at = jnp.asarray(place)
         found = [
             low + (high - low) * at[..., axis]
@@ -133,7 +133,7 @@ class LoadFamily:
         return self.setups[int(self.number(place))]
 
     def numbers(self, places: Floats) -> Floats:
-        """Direction (rad), amplitude (mm) and frequency (Hz) at places (..., n)."""
+        """Computes direction (rad), amplitude (mm) and frequency (Hz) at places (..., n)."""
         each = np.stack([np.asarray(one.numbers(places)) for one in self.setups])
         return np.take_along_axis(each, self.number(places)[None, ..., None], axis=0)[0]
 
@@ -167,7 +167,7 @@ def directed(
 
 
 def polar(motion: DIRECTED | Together) -> tuple[float, float]:
-    """Direction, rad, and amplitude, mm, of a motion or a mixture of two."""
+    """Returns direction, rad, and amplitude, mm, of a motion or a mixture of two."""
     if not isinstance(motion, Together):
         return float(motion.direction), float(motion.amplitude)
     first, second = (float(_one(one).amplitude) for one in motion.motions)

@@ -97,7 +97,7 @@ class _Posed(NamedTuple):
     solver: Solver
 
     def displacement(self, values: Parameters[Any], motion: MotionLaw, ratio: Array) -> Array:
-        """Displacement (1, n_times, n_units, 3), in time scaled by the ratio of frequencies."""
+        """Computes displacements (1, n_times, n_units, 3), in time scaled by a frequency ratio."""
         scaled = values._replace(mass=ratio**2 * values.mass, damping=ratio * values.damping)
         drive = self.scene.loads.following(motion)
         return differentiable_motion(self.solver, scaled, (drive,), designed=True).displacement

@@ -1,4 +1,4 @@
-"""Journal of expensive evaluations: a killed optimisation resumes exactly where it was.
+"""Journals expensive evaluations: a killed optimisation resumes exactly where it was.
 
 The optimisers are deterministic, so a run is resumed by running it again: evaluations that the
 journal holds are read back bit for bit, the first one that it does not hold is computed. Each
@@ -37,11 +37,11 @@ class Stateful(Protocol):
 
 
 class JournalInUseError(RuntimeError):
-    """Another process is writing to the journal."""
+    """Reports that another process is writing to the journal."""
 
 
 class Journal:
-    """Append-only file of evaluations; use it as a context manager.
+    """Appends evaluations to a file, and reads them back; use it as a context manager.
 
     Each record is a header (magic, length, CRC-32 of the payload) and a payload: a line of JSON
     with the shapes, then design, loss, gradient, more numbers and state as little-endian doubles. A

@@ -1,4 +1,4 @@
-"""First-order optimality of a design: residual of the Karush-Kuhn-Tucker conditions."""
+"""Measures first-order optimality: the residual of the Karush-Kuhn-Tucker conditions."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ MULTIPLIER = 1e-7
 
 @dataclass(frozen=True)
 class Stationarity:
-    """Optimality of a design."""
+    """Holds the optimality of a design."""
 
     # largest entry of the step (mm) that takes the design, pushed down the gradient by up to 1 mm,
     # back to its linearised constraints; 0 at an optimum, 1 where nothing is in the way of the

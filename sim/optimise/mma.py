@@ -1,4 +1,4 @@
-"""Method of moving asymptotes, globally convergent (Svanberg 1987; 2002, SIAM J. Optim. 12, 555).
+"""Minimises by moving asymptotes (Svanberg 1987; globally: 2002, SIAM J. Optim. 12, 555).
 
 Each function is replaced by a separable convex one with a pole on either side of every variable.
 If a replacement proves too optimistic at the optimum, it is stiffened and solved again. The
@@ -42,7 +42,7 @@ CORRECTIONS = 3
 
 @dataclass(frozen=True)
 class MmaOptions:
-    """Settings; lengths in mm.
+    """Holds the options of moving asymptotes; lengths in mm.
 
     Attributes:
         evaluations: largest number of simulations, corrections and failures included.
@@ -62,7 +62,7 @@ class MmaOptions:
 
 
 class Approximation:
-    """Convex separable replacements of the loss (row 0) and the constraints around one design.
+    """Replaces the loss (row 0) and the constraints by convex separable ones around one design.
 
     Svanberg's constraints read f <= 0, so f = -c. A constraint is stiffened only in the variables
     that it depends on, which keeps it sparse.
@@ -76,7 +76,7 @@ class Approximation:
         self.slopes.eliminate_zeros()
 
     def separable(self, rows: Ints, lower: Floats, upper: Floats) -> Separable:
-        """The subproblem with the functions ``rows`` (the loss first)."""
+        """Builds the subproblem with the functions ``rows`` (the loss first)."""
         chosen = self.slopes[rows].tocoo()
         row, column = chosen.coords
         reach = self.distance[column]
@@ -107,7 +107,7 @@ class Approximation:
 
 @dataclass(frozen=True)
 class MmaTrial:
-    """A feasible design that the replacements propose, with the loss that they promise there."""
+    """Holds a feasible design that the replacements propose, and the loss promised there."""
 
     place: ConstraintPoint
     promised: float
@@ -127,7 +127,7 @@ def mma(problem: CountedProblem, x0: Floats, options: MmaOptions) -> Result:
 
 
 class _Run:
-    """State of one run: the current design, its poles and stiffnesses."""
+    """Holds the state of one run: the current design, its poles and stiffnesses."""
 
     def __init__(self, problem: CountedProblem, point: EvaluatedPoint, options: MmaOptions) -> None:
         self.problem, self.options, self.point = problem, options, point
@@ -152,7 +152,7 @@ class _Run:
         self.least = 1e-2 * self.stiffness
 
     def outer(self) -> None:
-        """One accepted move, with as many corrections as it takes."""
+        """Makes one accepted move, with as many corrections as it takes."""
         model = Approximation(self.point, self.distance, self.stiffness)
         refused, stuck = np.zeros(0), False
         while self.problem.finished is None and self.reason is None:

@@ -1,4 +1,4 @@
-"""Convex separable subproblem of the method of moving asymptotes, by a primal-dual interior point.
+"""Solves the subproblem of the method of moving asymptotes by a primal-dual interior point.
 
     minimise    g_0(x) + weight * sum(y)
     subject to  g_i(x) <= y_i,  y >= 0,  low <= x <= high
@@ -29,12 +29,12 @@ WEIGHT = 1000.0
 
 
 class UnsolvedError(ArithmeticError):
-    """The interior point of a subproblem does not converge."""
+    """Reports that the interior point of a subproblem does not converge."""
 
 
 @dataclass(frozen=True)
 class Separable:
-    """The functions of the subproblem; row 0 is the objective."""
+    """Describes the functions of the subproblem; row 0 is the objective."""
 
     centre: Floats  # (n,) expansion point
     distance: Floats  # (n,) to the poles
@@ -45,17 +45,17 @@ class Separable:
     at_centre: Floats  # (1 + m,) values at the centre
 
     def values(self, x: Floats) -> Floats:
-        """All functions (1 + m,)."""
+        """Evaluates all functions (1 + m,)."""
         above, below = self._gaps(x)
         rise, fall = 1 / above - 1 / self.distance, 1 / below - 1 / self.distance
         return self.at_centre + self.up @ rise + self.down @ fall
 
     def slopes(self, x: Floats) -> sp.csr_array:
-        """Their derivatives (1 + m, n)."""
+        """Computes their derivatives (1 + m, n)."""
         return _with_entries(self.up, self.entries(x))
 
     def entries(self, x: Floats) -> Floats:
-        """Those derivatives at the places of the coefficients (n_entries,) alone."""
+        """Computes those derivatives at the places of the coefficients (n_entries,) alone."""
         above, below = self._gaps(x)
         columns = self.up.indices
         return self.up.data * (above**-2)[columns] - self.down.data * (below**-2)[columns]
@@ -67,7 +67,7 @@ class Separable:
         return np.asarray(total, dtype=float)
 
     def curvature(self, x: Floats, multipliers: Floats) -> Floats:
-        """Diagonal (n,) of the Hessian of their sum, weighted with ``multipliers`` (1 + m,)."""
+        """Computes the diagonal (n,) of the Hessian, summed by ``multipliers`` (1 + m,)."""
         above, below = self._gaps(x)
         rise = self.summed(self.up.data, multipliers) * above**-3
         return 2 * (rise + self.summed(self.down.data, multipliers) * below**-3)
@@ -152,7 +152,7 @@ class _InteriorPoint:
         )  # fmt: skip
 
     def residual(self, state: _State, barrier: float) -> Floats:
-        """Optimality conditions with complementarity relaxed to ``barrier``, all in one vector."""
+        """Evaluates the optimality conditions, with complementarity relaxed to ``barrier``."""
         problem, weights = self.problem, np.concatenate([[1.0], state.price])
         return np.concatenate(
             [
@@ -167,7 +167,7 @@ class _InteriorPoint:
         )
 
     def advance(self, state: _State, barrier: float) -> _State:
-        """One damped Newton step towards the central path."""
+        """Takes one damped Newton step towards the central path."""
         step = self._newton(state, barrier)
         length = self._room(state, step)
         before = np.linalg.norm(self.residual(state, barrier))
@@ -206,7 +206,7 @@ class _InteriorPoint:
         )
 
     def _room(self, state: _State, step: _State) -> float:
-        """Longest step, at most 1, that keeps everything positive by a margin."""
+        """Finds the longest step, at most 1, that keeps everything positive by a margin."""
         pairs = [
             (getattr(state, name), getattr(step, name))
             for name in ("y", "slack", "price", "floor", "left", "right")

@@ -32,11 +32,11 @@ log = logging.getLogger(__name__)
 
 
 class UnconfirmedError(SimulationError):
-    """None of the designs evaluated is confirmed."""
+    """Reports that none of the designs evaluated is confirmed."""
 
 
 class InfeasibleStartError(ValueError):
-    """No design that meets all constraints was found near the start.
+    """Reports that no design that meets all constraints was found near the start.
 
     Attributes:
         constraint: index of the most violated constraint at the start, within its bounds.
@@ -54,7 +54,7 @@ class InfeasibleStartError(ValueError):
 
 @dataclass(frozen=True)
 class Evaluation:
-    """One evaluation of the loss."""
+    """Records one evaluation of the loss."""
 
     number: int  # 0 for the first
     x: Floats  # (n,) the design
@@ -69,7 +69,7 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Result:
-    """Best feasible design found, and how it was found."""
+    """Holds the best feasible design found, and how it was found."""
 
     x: Floats  # (n,) the design
     loss: float  # as evaluated there
@@ -84,7 +84,7 @@ class Result:
 
 @dataclass(frozen=True)
 class ConstraintPoint:
-    """A design with its constraints, not yet simulated."""
+    """Holds a design with its constraints, not yet simulated."""
 
     x: Floats
     values: Floats
@@ -98,7 +98,7 @@ class ConstraintPoint:
 
 @dataclass(frozen=True)
 class EvaluatedPoint(ConstraintPoint):
-    """A simulated design."""
+    """Holds a simulated design."""
 
     number: int
     loss: float

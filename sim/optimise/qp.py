@@ -1,4 +1,4 @@
-"""The two quadratic programs of a feasible SQP step, by daqp (Arnström et al. 2022).
+"""Solves the two quadratic programs of a feasible SQP step by daqp (Arnström et al. 2022).
 
 An active-set method ends in the minimiser itself, to rounding, where an interior one comes near it;
 daqp is plain C without code for one processor or another, so its steps are those of any x86-64.
@@ -25,7 +25,7 @@ ITERATIONS = 20
 
 @dataclass(frozen=True)
 class Quadratic:
-    """Solution of a quadratic program."""
+    """Holds the solution of a quadratic program."""
 
     step: Floats  # (n,) the minimiser
     multipliers: Floats  # (m,) of the lower limits, >= 0; of several that coincide, one has all

@@ -1,4 +1,4 @@
-"""Damped BFGS model of the Lagrangian's Hessian (Powell 1978; Nocedal and Wright, section 18.3)."""
+"""Models the Lagrangian's Hessian by damped BFGS (Powell 1978; Nocedal and Wright, sec. 18.3)."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ The losses at hand are sums of squares that few directions bend; the trust radiu
 
 
 class QuasiNewton:
-    """Positive definite approximation of a Hessian, learned from gradient differences."""
+    """Approximates a Hessian by a positive definite matrix, learned from gradient differences."""
 
     def __init__(self, size: int, curvature: float) -> None:
         self.matrix: Floats = np.eye(size) * curvature  # a multiple of 1 until the first update

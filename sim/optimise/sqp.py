@@ -1,4 +1,4 @@
-"""Trust-region sequential quadratic programming in which every simulated design is feasible.
+"""Minimises by trust-region SQP, in which every simulated design is feasible.
 
 The constraints are cheap and the loss is not: so each trial step is brought back to the feasible
 set before it is simulated, and the loss alone decides whether it is accepted (Wright and Tenny
@@ -30,7 +30,7 @@ JUMP = 0.5
 
 @dataclass(frozen=True)
 class SqpOptions:
-    """Settings; lengths in mm.
+    """Holds the options of trust-region SQP; lengths in mm.
 
     Attributes:
         evaluations: largest number of simulations, failed ones included.
@@ -65,7 +65,7 @@ class SqpOptions:
 
 @dataclass(frozen=True)
 class SqpTrial:
-    """A feasible step that the model expects to pay."""
+    """Holds a feasible step that the model expects to pay."""
 
     place: ConstraintPoint  # where it leads
     predicted: float  # expected decrease of the loss
@@ -134,7 +134,7 @@ class Descent:
         self.model = QuasiNewton(len(point.x), max(steepest, 1e-300) / self.radius)
 
     def run(self) -> str:
-        """Descends; returns why it stopped."""
+        """Descends, and returns why it stopped."""
         while self.problem.finished is None:
             if self.residual <= self.options.residual:
                 return "stationary"

@@ -158,7 +158,7 @@ class StaticSolver:
         return (self.output_times[:, None] - way[:, None] * left).ravel()
 
     def _known(self, states: Floats) -> tuple[Floats, Ints]:
-        """Departure of the start's path from its tangents, and where it may serve."""
+        """Computes the departure of the start's path from its tangents, and where it may serve."""
         start = self.start
         if start is None or start.states.shape != states.shape:
             return states, np.zeros(len(states), dtype=np.int64)

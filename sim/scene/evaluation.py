@@ -77,7 +77,7 @@ class GradientChain:
         cases: Sequence[PrescribedMotion],
         memory: Memory | None = None,
     ) -> tuple[float, Floats, Floats]:
-        """Value, gradient (n_variables,) and further numbers of a design (n_variables,).
+        """Computes value, gradient (n_variables,) and further numbers of a design (n_variables,).
 
         Raises:
             SimulationError: a step failed, or an equilibrium is not stable.
@@ -147,7 +147,7 @@ class Evaluator:
         self._chains = [chain.mapped(each) for each in parameters_of_copies(scene)]
 
     def __call__(self, design: Floats) -> tuple[float, Floats, Floats]:
-        """Loss, gradient (n_variables,) in 1/mm and losses (n_cases,) of a design vector, mm.
+        """Computes loss, gradient (n_variables,) in 1/mm and losses (n_cases,) of a design, mm.
 
         Raises:
             SimulationError: the simulation fails.

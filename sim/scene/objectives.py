@@ -79,11 +79,11 @@ class ReactionMimicking(NamedTuple):
         return self.motion(displacement, parameters) + self.weight * jnp.sqrt(squares) / self.size
 
     def force(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
-        """Force (n_cases, n_times, 2) of the drive in states (n_cases, n_times, n_units, 3), N."""
+        """Sums the drive's force (n_cases, n_times, 2), N, in (n_cases, n_times, n_units, 3)."""
         return jnp.einsum("ctld,cl->ctd", self._pulls(displacement, parameters), self.sign)
 
     def carried(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
-        """Sum (n_cases, n_times) of the magnitudes of the ligaments' forces in states, N."""
+        """Sums (n_cases, n_times) the magnitudes of the ligaments' forces in states, N."""
         each = jnp.linalg.norm(self._pulls(displacement, parameters), axis=3)
         return jnp.einsum("ctl,cl->ct", each, np.abs(self.sign))
 
@@ -115,12 +115,12 @@ def p_mean(values: Numbers, largest: Numbers, weights: Numbers, sharpness: float
 
 
 def scales(spacing: float) -> Floats:
-    """(3,) divisors of ux, uy (mm) and theta (rad) that make them comparable."""
+    """Returns divisors (3,) of ux, uy (mm) and theta (rad) that make them comparable."""
     return np.array([spacing, spacing, 1.0])
 
 
 def extent(motion: Numbers, spacing: float) -> Any:  # noqa: ANN401  (arrays as those given)
-    """Size |U| (n_cases, n_times) of a region's motion (n_cases, n_times, n, 3)."""
+    """Computes the size |U| (n_cases, n_times) of a region's motion (n_cases, n_times, n, 3)."""
     norm = np.linalg.norm if isinstance(motion, np.ndarray) else jnp.linalg.norm
     return norm(motion / scales(spacing), axis=(2, 3))
 
@@ -168,7 +168,7 @@ class StrainEnergyMimicking(NamedTuple):
 def strain_energies(
     displacement: Numbers, parameters: Parameters[Any], ligaments: Ints, ligament_units: Ints
 ) -> Array:
-    """Strain energy (..., n) of the chosen ligaments in states (..., n_units, 3), N mm."""
+    """Computes the strain energy (..., n) of ligaments (n,) in states (..., n_units, 3), N mm."""
     whole = jnp.asarray(displacement)
     first, second = (whole[..., ligament_units[:, end], :] for end in range(2))
     arm, vector = parameters.arm[ligaments], parameters.vector[ligaments]

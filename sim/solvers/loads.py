@@ -20,15 +20,15 @@ the series's range."""
 
 
 class MotionLaw(Protocol):
-    """Motion (n_times, 3) of the driven units: ux, uy (mm), theta (rad)."""
+    """Describes the motion (n_times, 3) of the driven units: ux, uy (mm), theta (rad)."""
 
     def __call__(self, times: Numbers) -> Numbers:
-        """Motion at the given times, s."""
+        """Computes the motion at the given times, s."""
         ...
 
 
 def _along(direction: float | Array, displacement: Numbers) -> Numbers:
-    """Displacement along a direction (rad) without rotation, (n_times, 3)."""
+    """Returns displacement (n_times, 3) along a direction (rad), without rotation."""
     xp = displacement.__array_namespace__()
     still = xp.zeros_like(displacement)
     return xp.stack(
@@ -45,7 +45,7 @@ class Turning(NamedTuple):
     course: MotionLaw
 
     def __call__(self, times: Numbers) -> Numbers:
-        """Motion (n_times, 3) at the given times, s."""
+        """Computes the motion (n_times, 3) at the given times, s."""
         xp, along = times.__array_namespace__(), self.course(times)[:, 0]
         still = xp.zeros_like(along)
         return xp.stack([still, still, along], axis=-1)
@@ -71,7 +71,7 @@ class Harmonic(NamedTuple):
     delay: float = 0.0
 
     def __call__(self, times: Numbers) -> Numbers:
-        """Motion (n_times, 3) at the given times, s."""
+        """Computes the motion (n_times, 3) at the given times, s."""
         xp, shifted = times.__array_namespace__(), times - self.delay
         wave = self.amplitude * xp.sin(2 * xp.pi * self.frequency * shifted)
         if self.rise is not None:
@@ -88,7 +88,7 @@ class Pulse(NamedTuple):
     delay: float = 0.0
 
     def __call__(self, times: Numbers) -> Numbers:
-        """Motion (n_times, 3) at the given times, s."""
+        """Computes the motion (n_times, 3) at the given times, s."""
         xp, phase = times.__array_namespace__(), (times - self.delay) / self.width
         return _along(self.direction, self.amplitude * xp.exp(-(phase**2)))
 
@@ -101,7 +101,7 @@ class TanhRamp(NamedTuple):
     direction: float | Array = 0.0
 
     def __call__(self, times: Numbers) -> Numbers:
-        """Motion (n_times, 3) at the given times, s."""
+        """Computes the motion (n_times, 3) at the given times, s."""
         xp, phase = times.__array_namespace__(), 2 * times / self.duration - 1
         return _along(self.direction, self.amplitude * (1 + xp.tanh(6 * phase)) / 2)
 
@@ -114,7 +114,7 @@ class LinearRamp(NamedTuple):
     direction: float | Array = 0.0
 
     def __call__(self, times: Numbers) -> Numbers:
-        """Motion (n_times, 3) at the given times, s."""
+        """Computes the motion (n_times, 3) at the given times, s."""
         return _along(self.direction, self.amplitude * times / self.duration)
 
 
@@ -125,7 +125,7 @@ class Together(NamedTuple):
     shares: Floats | Array  # (n_units, n_motions) of each motion in that of each unit
 
     def __call__(self, times: Numbers) -> Numbers:
-        """Motion (n_times, n_units, 3) at the given times, s."""
+        """Computes the motion (n_times, n_units, 3) at the given times, s."""
         xp = times.__array_namespace__()
         each = xp.stack([motion(times) for motion in self.motions])
         return xp.einsum("um,mtd->tud", self.shares, each)
@@ -143,7 +143,7 @@ class TimeSeries(NamedTuple):
     motion: Numbers
 
     def __call__(self, times: Numbers) -> Numbers:
-        """Motion (n_times, 3) or (n_times, n_units, 3) at the given times, s."""
+        """Computes the motion (n_times, 3) or (n_times, n_units, 3) at the given times, s."""
         xp, flat = times.__array_namespace__(), self.motion.reshape(len(self.times), -1)
         columns = [xp.interp(times, self.times, flat[:, k]) for k in range(flat.shape[1])]
         return xp.stack(columns, axis=-1).reshape(len(times), *self.motion.shape[1:])

@@ -77,11 +77,11 @@ class PrescribedMotion(NamedTuple):
         return found if self.control is None else np.where(self.control == DISPLACEMENT, found, 0.0)
 
     def values(self, held: Ints, times: Floats) -> Floats:
-        """Values (n_times, n_held) of the held dofs."""
+        """Computes the values (n_times, n_held) of the held dofs."""
         return self.on(held).values(times)
 
     def rates(self, held: Ints, times: Floats) -> Floats:
-        """Their rates of change, per s."""
+        """Returns their rates of change, per s."""
         return self.on(held).rates(times)
 
     def on(self, held: Ints) -> "SelectedMotion":
@@ -96,7 +96,7 @@ class PrescribedMotion(NamedTuple):
         return np.asarray(plain(times))
 
     def start(self, topology: Topology, time: float) -> Floats:
-        """State (n_dofs,) in which a motion from rest begins: the held dofs are in place."""
+        """Returns the state (n_dofs,) that a motion begins in: at rest, the held dofs in place."""
         state = np.zeros(topology.n_dofs)
         state[topology.held] = self.values(topology.held, np.array([time]))[0]
         return state
@@ -115,11 +115,11 @@ class SelectedMotion(NamedTuple):
     selection: Floats  # (3 n, n_held) ones where a component is that of a held dof
 
     def values(self, times: Floats) -> Floats:
-        """Values (n_times, n_held) of the held dofs."""
+        """Computes the values (n_times, n_held) of the held dofs."""
         return np.asarray(selected(self.selection, self.drive._at(times)))
 
     def rates(self, times: Floats) -> Floats:
-        """Their rates of change, per s."""
+        """Returns their rates of change, per s."""
         return np.asarray(selected(self.selection, self.drive._of_law(rates_of, times)))
 
 

@@ -43,7 +43,7 @@ class Solver(Protocol):
     def forward(
         self, values: ConcreteParameters, drive: PrescribedMotion
     ) -> tuple[Floats, Floats, Any]:
-        """Displacement and velocity (n_times, n_dofs), and what ``backward`` needs.
+        """Computes displacement and velocity (n_times, n_dofs), and what ``backward`` needs.
 
         The held dofs' own entries are of no account: they follow from the drive.
 

@@ -31,7 +31,7 @@ _OPERATIONS: dict[str, list[Floats]] = {
 
 @dataclass(frozen=True)
 class DesignSpace:
-    """Linear map from a design vector (mm) to the shifts of the lattice's vertices.
+    """Maps a design vector (mm) linearly to the shifts of the lattice's vertices.
 
     Without symmetry the variables are the x and y shifts of the free groups, in the order of their
     numbers. With a symmetry each variable moves one orbit of them, by at most its own value. Where

@@ -21,7 +21,7 @@ _WIDER = 1.0 + 1e-9  # of a bound, for rounding
 
 @dataclass(frozen=True)
 class Gap:
-    """Smallest distance between two units."""
+    """Holds the smallest distance between two units."""
 
     distance: float  # mm, zero if they touch or overlap, infinite if there is only one unit
     units: tuple[int, int]  # ids, ascending; (-1, -1) if there is only one unit
@@ -29,7 +29,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Clearance:
-    """Gaps and overlaps over a history of states."""
+    """Holds gaps and overlaps over a history of states."""
 
     gap: Floats  # (n_states,) smallest distance between any two units, mm
     gap_units: Ints  # (n_states, 2) the units concerned

@@ -12,7 +12,7 @@ from sim.structure.lattice import Lattice
 
 
 class Shape(NamedTuple):
-    """Reference shape of a network."""
+    """Holds the reference shape of a network."""
 
     centroid: Array  # (n_units, 2) mm
     area: Array  # (n_units,) mm^2

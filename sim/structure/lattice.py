@@ -17,7 +17,7 @@ The second branch is that of voids between slender units, beyond 315 deg in the 
 
 @dataclass(frozen=True)
 class Lattice:
-    """A polygon network in its reference state (specimen frame, mm).
+    """Holds a network of polygons in its reference state (specimen frame, mm).
 
     The vertices of all units lie in one flat array, each polygon contiguous and counter-clockwise,
     so that units of any number of vertices mix freely.

@@ -15,7 +15,7 @@ A = TypeVar("A")
 
 
 class Parameters(NamedTuple, Generic[A]):
-    """All that a response depends on differentiably, besides the drive."""
+    """Holds all that a response depends on differentiably, besides the drive."""
 
     arm: A  # (n_ligaments, 2, 2) arms of both ends, mm
     vector: A  # (n_ligaments, 2) reference ligament vectors, mm

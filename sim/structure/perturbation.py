@@ -1,4 +1,4 @@
-"""Perturbed copies of a structure: vertices and units off their place, constants off their value.
+"""Perturbs copies of a structure: vertices and units off their place, constants off their value.
 
 A copy whose units overlap cannot be made, so such a place is drawn again until none is left: the
 shifts of the units concerned and of nothing else (partial resampling, Moser and Tardos 2010).
@@ -37,7 +37,7 @@ class Perturbation:
 
 @dataclass(frozen=True)
 class PerturbedStructure:
-    """A structure with its vertices off their place and its constants off their value.
+    """Describes a structure with its vertices off their place and its constants off their value.
 
     Where the units were assembled off their place, ligaments join them as they lie: a scene of it
     needs ``dataclasses.replace(lattice, vertices=vertices)``. Otherwise they keep their vectors.

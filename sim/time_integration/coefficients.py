@@ -20,7 +20,7 @@ LEAPFROG = Splitting(np.array([0.5, 0.5]), np.array([1.0]), 2, 2.0)
 
 
 def blanes_moan() -> Splitting:
-    """Order 4, six kicks, small errors (Blanes & Moan, J. Comput. Appl. Math. 142, 2002)."""
+    """Returns order 4 by six kicks (Blanes & Moan, J. Comput. Appl. Math. 142, 2002)."""
     a1, a2, a3 = 0.0792036964311957, 0.353172906049774, -0.0420650803577195
     b1, b2 = 0.209515106613362, -0.143851773179818
     drifts = [a1, a2, a3, 1 - 2 * (a1 + a2 + a3), a3, a2, a1]
@@ -30,7 +30,7 @@ def blanes_moan() -> Splitting:
 
 
 def _stability(drifts: Floats, kicks: Floats) -> float:
-    """Smallest h omega at which the map of an oscillator stops being a rotation."""
+    """Finds the smallest h omega at which the map of an oscillator stops being a rotation."""
     for z in np.arange(0.01, 2.0 * len(kicks) + 0.01, 0.01):
         step = np.array([[1.0, drifts[0]], [0.0, 1.0]])
         for drift, kick in zip(drifts[1:], kicks, strict=True):
@@ -53,7 +53,7 @@ class Tableau(NamedTuple):
 
 
 def esdirk3() -> Tableau:
-    """ESDIRK3(2)4L[2]SA: L-stable, order 3, stage order 2.
+    """Returns ESDIRK3(2)4L[2]SA: L-stable, order 3, stage order 2.
 
     Kennedy & Carpenter, NASA/TM-2016-219173; the coefficients follow from its order conditions with
     c3 = 3/5. The embedded solution of order 2 uses the first two stages.

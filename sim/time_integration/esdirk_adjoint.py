@@ -10,7 +10,7 @@ def adjoint(
     system: System, work: Workspace, stages: Floats, which: Ints, bars: Bars, n_times: int = 0,
     n_stages: int = 0, n_which: int = 0,
 ) -> bool:  # fmt: skip
-    """Reverse sweep of ``sim.time_integration.esdirk.march``, of its grid and stages.
+    """Sweeps back through ``sim.time_integration.esdirk.march``, of its grid and stages.
 
     `bar_u`, `bar_v` (n_steps + 1, n_dofs) are loss derivatives by displacement and velocity at the
     grid points; `which` are ligaments whose parameters are differentiated by; `bars` is added to.

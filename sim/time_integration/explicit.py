@@ -201,14 +201,14 @@ def _segment(n_steps: int) -> int:
 
 
 def _kicks(system: System, lengths: Floats) -> tuple[Floats, Floats]:
-    """Decay and gain (n_kicks, n_dofs) of kicks of the given lengths (s)."""
+    """Computes decay and gain (n_kicks, n_dofs) of kicks of the given lengths (s)."""
     mass, damping = system.mass, system.damping
     x = lengths[:, None] * damping / mass
     return np.exp(-x), lengths[:, None] / mass * _mean_decay(x)
 
 
 def _mean_decay(x: Floats) -> Floats:
-    """(1 - exp(-x)) / x, finite at zero."""
+    """Computes (1 - exp(-x)) / x, finite at zero."""
     safe = np.where(np.abs(x) < 1e-8, 1.0, x)
     return np.where(np.abs(x) < 1e-8, 1 - x / 2, -np.expm1(-safe) / safe)
 
@@ -216,7 +216,7 @@ def _mean_decay(x: Floats) -> Floats:
 def _kicks_transposed(
     system: System, lengths: Floats, steps: Steps, bar_decay: Floats, bar_gain: Floats
 ) -> tuple[Floats, Floats]:
-    """Derivatives by mass and damping (n_dofs,) from those by decay and gain."""
+    """Pulls derivatives by decay and gain back to those by mass and damping (n_dofs,)."""
     mass, damping = system.mass, system.damping
     x = lengths[:, None] * damping / mass
     # gain = length / mass * f(x) with f the mean decay; f'(x) = (decay - f) / x

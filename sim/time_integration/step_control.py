@@ -93,7 +93,7 @@ def _attempt(
     step: float,
     state: tuple[Floats, Floats],
 ) -> tuple[tuple[Floats, Floats] | None, float]:
-    """State after one step and its error estimate, or None if Newton's method failed."""
+    """Returns a step's end and error estimate, or None if Newton's method failed."""
     top, tableau = solver.topology, solver.tableau
     times = np.array([start, start + step])
     u, v, a = (np.zeros((2, len(tableau.nodes), top.n_dofs)) for _ in range(3))

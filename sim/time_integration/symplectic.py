@@ -8,7 +8,7 @@ from sim.time_integration.contact_substeps import Pace
 
 
 class Steps(NamedTuple):
-    """Equal steps of a splitting."""
+    """Describes equal steps of a splitting."""
 
     n_steps: int  # number of steps
     h: float  # step, s
@@ -20,7 +20,7 @@ class Steps(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """Interpolation of the outputs between the ends of a step."""
+    """Interpolates the outputs between the ends of a step."""
 
     interval: Ints  # (n_times,) step in which each output lies, ascending
     values: Floats  # (n_times, 4) weights of (u, u', v, v') in the displacement
@@ -48,7 +48,7 @@ def sweep_back(
     checkpoints: Floats, out_bar_u: Floats, out_bar_v: Floats, which: Ints, bars: Bars,
     bar_decay: Floats, bar_gain: Floats, n_watched: int = 0, n_which: int = 0,
 ) -> None:  # fmt: skip
-    """Reverse sweep of ``run`` from the loss derivatives by its outputs (n_times, n_dofs).
+    """Sweeps back through ``run`` from the loss derivatives by its outputs (n_times, n_dofs).
 
     Adds to ``bars``, but for damping and what mass does to the kicks: these enter through
     ``bar_decay`` and ``bar_gain``.

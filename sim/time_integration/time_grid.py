@@ -10,7 +10,7 @@ NEAR = 1e-7
 
 
 def graded(duration: float, first: float, growth: float, largest: float) -> Floats:
-    """Grid from 0 to ``duration`` (s) whose steps grow geometrically up to ``largest``.
+    """Makes a grid from 0 to ``duration`` (s) whose steps grow geometrically up to ``largest``.
 
     A drive that starts with a velocity jump needs short steps first. The grid's shape depends on
     its arguments alone, so it can be frozen.
@@ -77,7 +77,7 @@ def stage_times(times: Floats, nodes: Floats) -> Floats:
 
 
 def hermite_stencils(times: Floats, output_times: Floats) -> tuple[np.ndarray, Floats, Floats]:
-    """Cubic Hermite interpolation between grid points.
+    """Computes cubic Hermite interpolation between grid points.
 
     Returns:
         (n_times,) step in which each output time lies, and the weights (n_times, 4) of value at the

@@ -126,7 +126,7 @@ def cell_of(
 
 
 def _period(lattice: Lattice, first: Ints, step: Ints) -> Floats:
-    """Lattice vector from one cell to the next in the direction of a ``step`` of the index."""
+    """Returns the lattice vector from one cell to the next along a ``step`` of the index."""
     here, there = (np.flatnonzero((lattice.index == k).all(axis=1)) for k in (first, first + step))
     if len(here) != 1 or len(there) != 1:
         raise ValueError(
@@ -187,7 +187,7 @@ def strained(cell: UnitCell, gradient: Floats, free: Floats) -> StrainedCell:
 
 
 def _crushed(cell: UnitCell, at: StrainedCell) -> float:
-    """Largest change of length of a ligament, as a share of it."""
+    """Finds the largest change of length of a ligament, as a share of it."""
     ends = zip(_pairs(cell, at), cell.arm, cell.vector, strict=True)
     return max(
         abs(float(ligament_strain(one, other, arm[0], arm[1], vector).stretch))
@@ -197,7 +197,7 @@ def _crushed(cell: UnitCell, at: StrainedCell) -> float:
 
 
 def _pairs(cell: UnitCell, at: StrainedCell) -> Floats:
-    """Motion (n_ligaments, 2, 3) of the units at both ends of every ligament."""
+    """Returns the motion (n_ligaments, 2, 3) of the units at both ends of every ligament."""
     shift = np.pad(cell.image @ at.gradient.T, ((0, 0), (0, 1)))
     first, second = cell.joined.T
     return np.stack([at.motion[first], at.motion[second] + shift], axis=1)
@@ -227,7 +227,7 @@ def _cell_energy(cell: UnitCell, loose: Ints, state: Array, gradient: Array) -> 
 def _pair_energy(
     pair: Array, arm: Array, vector: Array, void: Array, law: Array, natural: Array, contact: Array
 ) -> Array:
-    """Energy of a ligament and its two voids in terms of both units' motion (2, 3)."""
+    """Sums the energy of a ligament and its two voids in terms of both units' motion (2, 3)."""
     voids = contact_void_angles(void, pair[0, 2], pair[1, 2])
     closed = jax.vmap(lambda angle: contact_energy(angle, ContactLaw(*contact)))(voids)
     stiffness = LigamentLaw(*law)

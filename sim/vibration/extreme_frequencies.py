@@ -18,9 +18,10 @@ def highest_frequency(
     motion: Floats | None = None,
     touching: Ints | None = None,
 ) -> float:
-    """Highest angular eigenfrequency (rad/s) about a state (default rest), by Lanczos iteration.
+    """Finds the highest angular eigenfrequency (rad/s) about a state, by Lanczos iteration.
 
-    Contact on void angles is that of the ligaments ``touching`` (default all).
+    The state is ``motion`` (n_units, 3), mm, mm, rad, by default rest; contact on void angles is
+    that of the ligaments ``touching`` (default all).
 
     Raises:
         NewContactPairs: units are near whose coupling the topology has no room for.
@@ -43,7 +44,7 @@ def highest_frequency(
 
 
 def lowest_frequency(topology: Topology, values: ConcreteParameters) -> float:
-    """Lowest angular eigenfrequency at rest, rad/s; zero if the rest is not stable.
+    """Finds the lowest angular eigenfrequency at rest, rad/s; zero if the rest is not stable.
 
     It is infinite where no dof is free.
     """
@@ -72,7 +73,7 @@ def _root_mass(topology: Topology, values: ConcreteParameters) -> Floats:
 
 
 def _largest(product: Callable[[Floats], Floats], size: int, tolerance: float) -> float:
-    """Eigenvalue of largest magnitude of a symmetric operator."""
+    """Finds the eigenvalue of largest magnitude of a symmetric operator."""
     if size == 0:
         return 0.0
     if size <= 2:

@@ -21,7 +21,7 @@ SHIFT = 1.0
 
 
 class Linear(NamedTuple):
-    """M u'' + C u' + K u = -K_held u_held for small motions u of the free dofs about a state."""
+    """Holds M u'' + C u' + K u = -K_held u_held for small motions u of free dofs about a state."""
 
     stiffness: sp.csc_array  # (n_free, n_free) K, tangent of the energy
     coupling: sp.csc_array  # (n_free, n_held) K_held
@@ -164,7 +164,7 @@ def _signs(shapes: Floats) -> Floats:
 
 
 def transmission(of: Linear, drives: Floats, frequencies: Floats) -> Complexes:
-    """Steady motion (n_frequencies, n_cases, n_units, 3) under harmonic motion of the held dofs.
+    """Computes the steady motion (n_frequencies, n_cases, n_units, 3) under harmonic drives.
 
     Args:
         of: the structure.
