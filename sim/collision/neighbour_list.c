@@ -1,10 +1,11 @@
 /* Searches vertices and edges within the reach of contact; conservative.
 
-   The broad phase sweeps all units and notes the gap of each pair of them that may meet. The gap of
-   a pair shrinks by no more than its units have moved since, so most pairs are skipped without a
-   look at their vertices; once any unit has moved by `margin`, the sweep is repeated. Pairs whose
-   coupling the tangent has no room for ("new pairs") are noted before they come within reach: the
-   state then counts as not admissible, and the solve goes on, or is repeated, with more room. */
+   The broad phase (sweep and prune along x) visits all units and notes the gap of each pair of them
+   that may meet. The gap of a pair shrinks by no more than its units have moved since, so most pairs
+   are skipped without a look at their vertices; once any unit has moved by `margin`, the sweep is
+   repeated. Pairs whose coupling the tangent has no room for ("new pairs") are noted before they
+   come within reach: the state then counts as not admissible, and the solve goes on, or is repeated,
+   with more room. */
 #include "sim/collision/collision.h"
 #include "sim/core/numbers.h"
 

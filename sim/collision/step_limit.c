@@ -1,4 +1,4 @@
-/* Limits a step so that no units pass through each other, by safe advances.
+/* Limits a step so that no units pass through each other, by conservative advancement.
 
    Two outlines that do not cross can only come to cross where a vertex of one meets an edge of the
    other. In the frame of the edge's unit the vertex moves on a smooth curve, whose curvature is
@@ -115,10 +115,11 @@ static double largest_of(const double *values, int64_t n) {
     return largest;
 }
 
-static double room_for_new_pairs(const double *sway, const ContactArrays *contacts) {
+/* Multiple of the step before which no pair comes near that the tangent has no room for. */
+static double room_for_new_pairs(const double *speed, const ContactArrays *contacts) {
     const NeighbourCache *cache = &contacts->cache;
     double left = cache->room[0] - 2.0 * largest_of(cache->moved, cache->n_moved);
-    double fastest = 2.0 * largest_of(sway, contacts->n_radius);
+    double fastest = 2.0 * largest_of(speed, contacts->n_radius);
     return least(FAR, most(left, 0.0) / most(fastest, 1e-300));
 }
 
@@ -126,23 +127,24 @@ double step_limit_collision_free_step(
     double *motion, const ContactArrays *contacts, double *step) {
     if (neighbour_list_find(motion, contacts) < 0) return 0.0;
     const NeighbourCache *cache = &contacts->cache;
-    double fastest = 0.0, *sway = malloc(sizeof(double) * contacts->n_radius);
+    double fastest = 0.0, *speed = malloc(sizeof(double) * contacts->n_radius);
     for (int64_t unit = 0; unit < contacts->n_radius; unit++) {
-        sway[unit] = hypot(step[3 * unit], step[3 * unit + 1]);
-        sway[unit] += contacts->radius[unit] * fabs(step[3 * unit + 2]);
-        fastest = most(fastest, cache->moved[unit] + FAR * sway[unit]);
+        /* how far the step moves any point of the unit at most */
+        speed[unit] = hypot(step[3 * unit], step[3 * unit + 1]);
+        speed[unit] += contacts->radius[unit] * fabs(step[3 * unit + 2]);
+        fastest = most(fastest, cache->moved[unit] + FAR * speed[unit]);
     }
     double largest = FAR;
     if (2.0 * fastest > cache->room[0])  /* new pairs meet no sooner than this */
-        largest = room_for_new_pairs(sway, contacts);
+        largest = room_for_new_pairs(speed, contacts);
     for (int64_t k = 0; k < contacts->n_pairs; k++) {
         int64_t a = contacts->pairs[2 * k], b = contacts->pairs[2 * k + 1];
         double gap = cache->gap[k] - cache->moved[a] - cache->moved[b];
-        if (gap < largest * (sway[a] + sway[b])) {
+        if (gap < largest * (speed[a] + speed[b])) {
             largest = pass_unit(a, b, largest, step, contacts);
             largest = pass_unit(b, a, largest, step, contacts);
         }
     }
-    free(sway);
+    free(speed);
     return largest == FAR ? INFINITY : largest;
 }

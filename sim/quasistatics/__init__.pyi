@@ -1,10 +1,10 @@
 from . import newton as newton
 from . import static_solver as static_solver
-from .arc_length import EquilibriumTrace as EquilibriumTrace
-from .arc_length import trace as trace
-from .arc_length import trace_first_snap as trace_first_snap
 from .eigenvalue import eigenvalue_and_slopes as eigenvalue_and_slopes
 from .eigenvalue import lowest_eigenpair as lowest_eigenpair
+from .equilibrium_trace import EquilibriumTrace as EquilibriumTrace
+from .equilibrium_trace import trace as trace
+from .equilibrium_trace import trace_first_snap as trace_first_snap
 from .path_ends import BRANCHING as BRANCHING
 from .path_ends import LIMIT_POINT as LIMIT_POINT
 from .softness import SoftestPoint as SoftestPoint
