@@ -223,7 +223,7 @@ def _import(path: Path, args: argparse.Namespace) -> None:
     if out.exists() and out.read_text(encoding="utf-8") != text:
         raise _there_is_one(out)
     described_by = provenance.file_hash(path)
-    if design.exists() and not _is_imported(design, described_by):
+    if design.exists() and not _is_imported(design):
         raise UserError("there is a design already", file=design, remedy="remove it, or --out-dir")
     origin = {
         "problem": "{}",
@@ -236,10 +236,11 @@ def _import(path: Path, args: argparse.Namespace) -> None:
     LOG.info("python -m pipeline track %s --out %s", out, "track.nc")
 
 
-def _is_imported(design: Path, described_by: str) -> bool:
-    """Tells whether a design was imported from the description with this hash."""
+def _is_imported(path: Path) -> bool:
+    """Tells whether a design was imported from a description, which may have changed since."""
     with suppress(UserError):
-        return bool(datasets.read(design, "design").attrs["problem_hash"] == described_by)
+        parents = json.loads(datasets.read(path, "design").attrs["parents"])
+        return list(parents) == ["description"]
     return False
 
 
