@@ -153,7 +153,8 @@ class Problem(Section):
         optimiser: how to look for the design.
         solver: accuracy of the simulation.
         response: how much of it is shown.
-        designs: values of one parameter, named by its keys joined by dots: a design for each.
+        designs: values of one parameter, named by its keys joined by dots: a design for each, and,
+            of a harmonic drive, one page of all.
         sweep: the losses at many settings of parameters, if they are wanted.
         robustness: trials of imperfect copies, if there are to be any.
         prediction: by how much specimens and constants may be off.

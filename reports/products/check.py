@@ -25,6 +25,7 @@ from pipeline.posing import (
     variant_faults,
 )
 from pipeline.problem import Problem
+from pipeline.problem.sections import HarmonicDrive, RampHarmonicDrive
 from pipeline.runtime import write_atomically
 from reports.base import style
 from reports.figures import kinds
@@ -76,7 +77,13 @@ def _show(args: argparse.Namespace) -> None:
 
 
 def _unread(asked: Problem) -> Iterator[str]:
-    """Doubts keys of the report that its figure does not read."""
+    """Doubts keys that no figure reads, or for which there is none."""
+    if asked.designs is not None and not isinstance(asked.drive, HarmonicDrive | RampHarmonicDrive):
+        yield (
+            "the page of several `designs` is of harmonic drives, not of"
+            f" `{asked.drive.kind}`: they are designed and simulated, but their page is not drawn;"
+            " give them as presets for a page each"
+        )
     if asked.report.places and kinds.kind_of(asked) is not kinds.WAVE:
         yield (
             "`report.places` are shown where a motion in time is to be that of the intact lattice"

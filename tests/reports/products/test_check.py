@@ -85,6 +85,18 @@ def test_places_that_no_figure_shows_are_doubted(
     assert "warning: `report.places` are shown where a motion in time" in capsys.readouterr().err
 
 
+def test_designs_without_a_page_are_doubted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    several = "designs: { void.disc.radius: [7 mm, 8 mm] }\n"
+    path = static.write(tmp_path, static.HOLE + several, size=5, amplitude=3.0)
+    assert main(["check", "--problem", str(path), "--out-dir", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr().err
+    assert (
+        "warning: the page of several `designs` is of harmonic drives, not of `linear_ramp`" in told
+    )
+
+
 def test_measured_constants_are_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     named = "report: { measured_constants: { file: constants.csv, samples: 2 } }\n"
     path = static.write(tmp_path, static.HOLE + named, size=5, amplitude=3.0)
