@@ -40,6 +40,11 @@ _MARKED = 0.3
 _STRANGE = 0.1
 """Most part of the units whose outlines may be others."""
 _QUARTER = np.pi / 4
+_FEWEST_PIXELS, _NEEDED, _GOOD_PIXELS = 12.0, 20.0, 40.0
+"""Pixels from unit to unit below which outlines tell no camera; with which they tell units from
+others for sure; and with which they are told well."""
+_FEW = 6
+"""Units, below which their places do not tell how large a pixel is."""
 _FAINT = 0.12
 """Contrast of a unit, over the usual one, below which it is hidden."""
 
@@ -65,7 +70,9 @@ def recognise(
             _check_scale(anywhere[0], specimen, px_per_mm)
             found = anywhere
     if not _enough(found[0], specimen):
-        raise _another_design(detection_summary(found[0], specimen))
+        raise _not_recognised(specimen, found[0], detection_summary(found[0], specimen))
+    if _pitch(specimen, found[0]) < _FEWEST_PIXELS:
+        raise _too_coarse(specimen, found[0])
     return _as_stated(best_orientations(image, specimen, found), setup)
 
 
@@ -99,9 +106,8 @@ def check_outlines(
     there = units_in_frame(specimen, calibration)
     strange = there & ~agreeing_outlines(specimen, calibration.outlines)
     if strange.sum() > _STRANGE * there.sum():
-        raise _another_design(
-            f"{detection_summary(detection, specimen)}; {_named(specimen, strange)}"
-        )
+        seen = f"{detection_summary(detection, specimen)}; {_named(specimen, strange)}"
+        raise _not_recognised(specimen, detection, seen)
     if not there.all():
         LOG.warning(
             "%d units reach out of the first frame; where a whole row does, the lattice"
@@ -151,7 +157,26 @@ def _named(specimen: SpecimenOutlines, strange: Mask) -> str:
     return f"{strange.sum()} units are hidden or not as the design has them ({ids})"
 
 
-def _another_design(seen: str) -> UserError:
+def _pitch(specimen: SpecimenOutlines, found: LatticeDetection) -> float:
+    """Measures the distance of joined units in a frame, px; infinite where too few were found."""
+    if len(found.unit) < max(_FEW, _SOME * specimen.count):
+        return np.inf
+    return specimen.pitch * float(np.median(found.camera.px_per_mm(specimen.centre)))
+
+
+def _too_coarse(specimen: SpecimenOutlines, found: LatticeDetection) -> UserError:
+    return UserError(
+        f"{_pitch(specimen, found):.0f} px from unit to unit are too few to tell units and their"
+        f" motions: {_NEEDED:.0f} px are needed, {_GOOD_PIXELS:.0f} px are good",
+        key="video",
+        remedy="film from closer, with a longer lens, or at a higher resolution",
+    )
+
+
+def _not_recognised(specimen: SpecimenOutlines, found: LatticeDetection, seen: str) -> UserError:
+    """Explains a first frame whose units are not the design's: few pixels, or another design."""
+    if _pitch(specimen, found) < _NEEDED:
+        return _too_coarse(specimen, found)
     return UserError(
         f"the first frame does not show this design: {seen}",
         key="design",

@@ -1,4 +1,4 @@
-"""Pictures of many pixels a unit: what moves quickly is found as in those of fewer."""
+"""Pixels from unit to unit: with many, quick units are found as with fewer; too few are told."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from benchmarks.tracking.clip_scripts import GRID, ClipScript
-from benchmarks.tracking.rendering import View
-from benchmarks.tracking.wild_clips import errors, film, tracked
+from benchmarks.tracking.rendering import Renderer, View, eight_bit
+from benchmarks.tracking.wild_clips import errors, film, specimen, tracked
+from pipeline.tracking.frames import Frame
 from pipeline.tracking.geometry import Camera
+from pipeline.tracking.motion import track_video
 from sim.core import Floats
+from tests.tables import refused
 
 CLIP = ClipScript(
     pace=lambda time: 2 * np.sin(2 * np.pi * 2 * time) ** 2,
@@ -42,6 +45,17 @@ def test_what_a_blur_leaves_open_is_a_length(tmp_path: Path) -> None:
     script = script._replace(view=view(120, 0.008), times=np.arange(14) / 30)
     clip = film(script, tmp_path / "unused.mkv")
     assert errors(clip, tracked(clip)).lost == 0.0
+
+
+@pytest.mark.parametrize("pitch", [15, 10, 8])
+@pytest.mark.parametrize("scaled", [False, True])
+def test_too_few_pixels_are_told_with_their_number(pitch: int, scaled: bool) -> None:
+    squares = specimen(GRID | {"grid": [6, 6]})
+    still, shown = np.zeros((1, 36, 3)), View(size=(200, 200), scale=pitch / 15)
+    image = eight_bit(Renderer(squares, lambda _: still, shown).frame(0.0))
+    with refused(f"{pitch} px from unit to unit are too few", remedy="closer") as caught:
+        track_video(iter([Frame(0, 0.0, image)]), squares, pitch / 15 if scaled else None)
+    assert "20 px" in str(caught.value)
 
 
 @pytest.mark.parametrize("fisheye", [0.0, 0.6])
