@@ -2,7 +2,9 @@
 
 from typing import NamedTuple
 
+import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pipeline.runtime import Picture
 from pipeline.tracking.detect.blobs import find_blobs
@@ -17,6 +19,8 @@ _CLEAR, _FEWEST = 0.1, 3
 _BETTER, _HALF_SEEN, _AGREEING = 1.2, 0.5, 0.2
 _ELSEWHERE = 0.5
 """Distance of places that are others, pitches."""
+_SMOOTH = 25.0
+"""Pixels a pitch that patches need to be seen."""
 
 
 class LatticePlace(NamedTuple):
@@ -74,6 +78,29 @@ class Relocaliser(NamedTuple):
             LatticePlace(np.column_stack([one.place - centre, pose[:, 2] + one.turn]), one.turn)
             for one in alike
         ]
+
+    def near_unclaimed(self, image: Picture, pose: Floats, good: Mask) -> Mask:
+        """Tells units (units,) near whose places a patch of a unit's size is no good unit's.
+
+        Args:
+            image: the frame.
+            pose: (units, 3) where units are looked for; of good ones, where they are.
+            good: (units,) those found.
+        """
+        centre, pitch = self.specimen.centre, self.specimen.pitch
+        scale = float(self.camera.px_per_mm(centre.mean(axis=0)))
+        factor = max(1, int(scale * pitch / _SMOOTH))
+        small = cv2.resize(image, None, fx=1 / factor, fy=1 / factor, interpolation=cv2.INTER_AREA)
+        found = find_blobs(
+            np.asarray(small, np.float32), self.specimen, scale / factor, self.bright
+        )
+        patches = self.camera.unproject((found + 0.5) * factor - 0.5)
+        place, most = centre + pose[:, :2], _ELSEWHERE * pitch
+        if good.any() and len(patches):
+            patches = patches[cKDTree(place[good]).query(patches)[0] > most]
+        if not len(patches):
+            return np.zeros(len(good), bool)
+        return np.asarray((cKDTree(patches).query(place)[0] < most) & ~good)
 
     def _rivals(self, best: Placement, other: Placement) -> bool:
         apart = np.median(np.linalg.norm(best.place - other.place, axis=1))

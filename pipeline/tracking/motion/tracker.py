@@ -10,7 +10,7 @@ from pipeline.tracking.detect import LatticePlace
 from pipeline.tracking.fit import PoseFits
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.prediction import latest_velocity
-from pipeline.tracking.motion.unit_looks import SHARE, UnitLooks, white_share
+from pipeline.tracking.motion.unit_looks import HIDDEN, SHARE, STRAYED, UnitLooks, white_share
 from pipeline.tracking.motion.unit_search import UnitSearch, UnitStates, gain_change
 from sim.core import Floats, Ints, Mask, Reals
 
@@ -152,7 +152,12 @@ class Tracker:
         middle = self._search.fitter.camera.project(self._centre[lost] + pose[lost, :2])
         reach = _FACE * self._search.fitter.templates.reach[lost] / self._search.pixel
         white[lost] = white_share(image, middle, reach)
-        return self._search.looks.reasons(fits, good, self._relocaliser.in_view(pose), white)
+        reasons = self._search.looks.reasons(fits, good, self._relocaliser.in_view(pose), white)
+        hidden = (reasons == HIDDEN) & self._seen
+        if hidden.any():
+            now = np.where(good[:, None], fits.pose, pose)
+            reasons[hidden & self._relocaliser.near_unclaimed(image, now, good)] = STRAYED
+        return reasons
 
     def _relocalise(self, image: Picture, fits: PoseFits, good: Mask) -> tuple[PoseFits, Mask]:
         """Tries all units anew where the lattice is found; keeps what is more."""

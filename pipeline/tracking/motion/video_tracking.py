@@ -34,7 +34,7 @@ from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.motion_modes import count_at_rest
 from pipeline.tracking.motion.time_interpolation import at_frame_times, middle_speed
 from pipeline.tracking.motion.tracker import Tracker
-from pipeline.tracking.motion.unit_looks import GOOD, HIDDEN, POOR_FIT
+from pipeline.tracking.motion.unit_looks import GOOD, HIDDEN, POOR_FIT, STRAYED
 from pipeline.tracking.motion.unit_search import Shutter, UnitSearch
 from pipeline.tracking.reference_frame import (
     CameraCalibration,
@@ -175,7 +175,7 @@ def _lose_unsure(motion: Reals, missed: Reals, qualities: NDArray[np.int8], leng
     off = np.sqrt(missed[..., :2].max(axis=-1)) / length
     usual = np.median(off, axis=1, keepdims=True)  # one unit alone has met with noise
     unsure = (off > _UNSURE) & (usual > _UNSURE / 5)
-    motion[unsure], qualities[unsure] = np.nan, POOR_FIT
+    motion[unsure], qualities[unsure] = np.nan, STRAYED
     if not np.isfinite(motion).any():
         what, remedy = "no unit has a pose in any frame", "correct exposure and readout"
         raise UserError(what, remedy=f"{remedy}, film at a higher rate, or rest in the first frame")

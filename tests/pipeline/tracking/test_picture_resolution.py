@@ -13,7 +13,8 @@ from benchmarks.tracking.wild_clips import errors, film, specimen, tracked
 from pipeline.tracking.frames import Frame
 from pipeline.tracking.geometry import Camera
 from pipeline.tracking.motion import track_video
-from sim.core import Floats
+from pipeline.tracking.motion.unit_looks import HIDDEN, STRAYED
+from sim.core import Floats, Singles
 from tests.tables import refused
 
 CLIP = ClipScript(
@@ -36,6 +37,26 @@ def test_quick_motions_are_followed_however_fine_pictures_are(pitch: int, tmp_pa
     found = errors(clip, tracked(clip))
     assert (found.lost, found.gross) == (0.0, 0)
     assert found.rms < 0.01
+
+
+def test_a_unit_in_view_that_went_too_far_is_not_hidden(tmp_path: Path) -> None:
+    def covered(image: Singles, time: float) -> None:
+        """Puts a unit aside in one frame, and a cap over another."""
+        if time > 0.05:
+            unit = image[60:119, 60:119].copy()
+            image[60:119, 60:119] = 205.0
+            image[43:102, 43:102] = unit
+            cv2.circle(image, (270, 270), 42, 120.0, -1)
+
+    script = CLIP._replace(view=view(60), cover=covered, times=np.arange(3) / 30)
+    script = script._replace(pace=lambda time: 0 * time)
+    clip = film(script, tmp_path / "unused.mkv")
+    place = np.round(script.view.project(clip.specimen.centre - clip.specimen.centre.mean(axis=0)))
+    aside, under = (
+        int(np.argmin(np.linalg.norm(place - at, axis=1))) for at in ((89, 89), (270, 270))
+    )
+    track = tracked(clip)
+    assert (track.quality[2, aside], track.quality[2, under]) == (STRAYED, HIDDEN)
 
 
 @pytest.mark.slow
