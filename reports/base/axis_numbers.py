@@ -1,7 +1,6 @@
 """Sets the numbers on axes: powers of ten, minus signs, and none that is wider than its room."""
 
 import re
-from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -36,31 +35,34 @@ def is_power(value: float) -> bool:
     return f"{value:.0e}".startswith("1e")
 
 
-def scale_wide_numbers(axes: Axes) -> None:
+def scale_wide_numbers(axes: Axes) -> int:
     """Takes the power of ten out of wide numbers on both axes, into their labels.
 
     It is called when the limits are final. A logarithmic axis of many decades has powers of ten.
+
+    Returns:
+        The exponent of what was taken out of the y axis.
     """
-    for axis in (axes.xaxis, axes.yaxis):
-        formatter = axis.get_major_formatter()
-        low, high = np.sort(axis.get_view_interval())
-        shown = [at for at in axis.get_majorticklocs() if low <= at <= high]
-        if isinstance(formatter, FixedFormatter) or not np.any(shown):
-            continue
-        widest = max(map(len, formatter.format_ticks(shown)))
-        if widest > WIDEST or formatter.get_offset():
-            _scale(axis, shown, powers=axis.get_scale() == "log" and high > DECADES * low)
+    _scale(axes.xaxis)
+    return _scale(axes.yaxis)
 
 
-def _scale(axis: Axis, shown: Sequence[float], *, powers: bool) -> None:
-    if powers:
+def _scale(axis: Axis) -> int:
+    formatter = axis.get_major_formatter()
+    low, high = np.sort(axis.get_view_interval())
+    shown = [at for at in axis.get_majorticklocs() if low <= at <= high]
+    if isinstance(formatter, FixedFormatter) or not np.any(shown):
+        return 0
+    if max(map(len, formatter.format_ticks(shown))) <= WIDEST and not formatter.get_offset():
+        return 0
+    if axis.get_scale() == "log" and high > DECADES * low:
         axis.set_major_formatter(lambda value, _: _power(value) if is_power(value) else "")
-        return
+        return 0
     exponent = 3 * int(np.floor(np.log10(np.abs(shown).max()) / 3.0))
-    if exponent == 0:
-        return
-    axis.set_major_formatter(lambda value, _: typeset(f"{value / 10.0**exponent + 0.0:g}"))
-    axis.set_label_text(_scaled_label(axis.get_label_text(), exponent))
+    if exponent != 0:
+        axis.set_major_formatter(lambda value, _: typeset(f"{value / 10.0**exponent + 0.0:g}"))
+        axis.set_label_text(_scaled_label(axis.get_label_text(), exponent))
+    return exponent
 
 
 def _scaled_label(label: str, exponent: int) -> str:

@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 
 from pipeline.posing import FEASIBLE
-from reports.base import style, typeset
+from reports.base import scale_wide_numbers, style, typeset
 
 SIDES: tuple[tuple[tuple[float, float], dict[str, Any]], ...] = (
     ((0, -4.5), {"ha": "right", "va": "top"}),
@@ -39,8 +39,9 @@ def loss_history(axes: Axes, design: xr.Dataset) -> None:
     style.log_values(axes)
     axes.set(xlabel="Evaluation", ylabel=loss_label(design["best_loss"]), xlim=(0, None))
     axes.set_ylim(_lowest(design), None)
+    unit = 10.0 ** scale_wide_numbers(axes)
     for method in design["method"].values:
-        _name_best(axes, design.sel({"method": method}))
+        _name_best(axes, design.sel({"method": method}), unit)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), ncols=2, columnspacing=1.2)
 
@@ -70,11 +71,14 @@ def _history(axes: Axes, history: xr.Dataset, colour: str, name: str) -> None:
     axes.plot(at, best, "o", ms=3.6, mfc="white", mec=colour, mew=1.0, zorder=6)
 
 
-def _name_best(axes: Axes, history: xr.Dataset) -> None:
-    """Writes the best loss beside its mark, on the first side that crosses the least of curves."""
+def _name_best(axes: Axes, history: xr.Dataset, unit: float) -> None:
+    """Writes the best loss beside its mark, on the first side that crosses the least of curves.
+
+    It is in the `unit` of the axis.
+    """
     at, best = int(history["best_evaluation"]), float(history["best_loss"])
     colour = style.METHOD_COLOURS.get(str(history["method"].values), style.GREY)
-    number = typeset(f"{best:.3g}")
+    number = typeset(f"{best / unit:.3g}")
     written = [
         style.note(axes, (at, best), number, shift, color=colour, zorder=7, **corner)
         for shift, corner in SIDES

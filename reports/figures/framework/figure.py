@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from reports.base import prose, style
+from reports.base import prose, scale_wide_numbers, style
 from reports.facts import measures
 from reports.figures.framework import domain_panels, model_panel
 from reports.figures.shielding import MONITORED, monitored, monitored_recordings
@@ -183,6 +183,7 @@ def _compared(figure: Figure, study: StudyResults, at: tuple[float, float]) -> N
         axes.set_title(f"dots: {recordings[0].source}", fontsize=style.SMALL, pad=2.0)
     axes.set_xlabel("$t$ (s)", labelpad=1.0)
     axes.set_ylabel("$u_y$ (mm)", labelpad=1.0)
+    scale_wide_numbers(axes)
 
 
 def _say(figure: Figure, x: float, y: float, text: str, **told: str | float) -> None:

@@ -84,9 +84,7 @@ def design_panels(
                 overlay(axes)
 
     def optimisation(figure: Figure) -> None:
-        axes = style.place(figure, 133.5, 8.5, 43.5, 31.5)
-        loss_history(axes, study.design)
-        scale_wide_numbers(axes)
+        loss_history(style.place(figure, 133.5, 8.5, 43.5, 31.5), study.design)
 
     design, history = tables.of_design(study)
     return [

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
-from reports.base import scale_wide_numbers, style
+from reports.base import scale_wide_numbers, style, typeset
 from reports.facts import measures, percent
 from reports.figures.shielding.facts import monitored, paper_loss
 from reports.figures.shielding.structure_panels import SnapshotRow
@@ -22,7 +22,6 @@ def loss_panel(axes: Axes, design: xr.Dataset, quoted: bool) -> None:
     loss_history(axes, design)
     if quoted:
         _paper_line(axes, design)
-    scale_wide_numbers(axes)
 
 
 def _paper_line(axes: Axes, design: xr.Dataset) -> None:
@@ -64,6 +63,7 @@ def motion_panel(
     axes.set(xlabel="Time $t$ (s)", ylabel="$u_y$ (mm)", xlim=(0, 1.27 * end), ylim=(-limit, limit))
     axes.xaxis.set_major_locator(FixedLocator(list(np.arange(0, end + 1e-9, scene.period / 2))))
     style.short_numbers(axes)
+    scale_wide_numbers(axes)
     axes.spines["bottom"].set_bounds(0, end)
     axes.xaxis.set_label_coords(0.5 / 1.27, -0.13)
     lines = [*axes.get_legend_handles_labels()[0], *measured_overlay.handles(recordings)]
@@ -88,7 +88,7 @@ def _span_arrow(axes: Axes, at: float, curve: Floats, colour: str, span: float) 
     low, high = float(curve.min()), float(curve.max())
     caps = {"arrowstyle": "|-|,widthA=0.15,widthB=0.15", "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (at, high), (at, low), arrowprops=caps | {"color": colour, "lw": 0.8})
-    style.note(axes, (at, high), f"{span:.3g} mm", color=colour)
+    style.note(axes, (at, high), f"{typeset(f'{span:.3g}')} mm", color=colour)
 
 
 def map_panel(figure: Figure, axes: Axes, bar: Axes, scene: ReportScene, sweep: xr.Dataset) -> None:

@@ -11,7 +11,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc
 
-from reports.base import style
+from reports.base import scale_wide_numbers, style
 from reports.facts import measures
 from reports.figures.shielding.facts import MONITORED
 from reports.panels import (
@@ -150,7 +150,8 @@ def snapshots_panel(
                 text = f"$t$ = {row.time[m]:.3f} s"
                 axes.set_title(text, fontsize=style.TEXT, pad=1.0)
     place = (left + count * side + 1.5, top, len(rows) * side - gap)
-    colour_bar(figure, norm, style.MAGNITUDE, place, r"$\|\mathbf{U}\|$", extend="max")
+    made = colour_bar(figure, norm, style.MAGNITUDE, place, r"$\|\mathbf{U}\|$", extend="max")
+    scale_wide_numbers(made.ax)
 
 
 def _colour_limit(scene: ReportScene, rows: Sequence[SnapshotRow]) -> float:

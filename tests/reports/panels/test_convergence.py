@@ -52,3 +52,10 @@ def test_the_curve_of_every_load_case_is_on_the_panel() -> None:
     assert low < cases.min() < cases.max() < high
     loss_history(alone := Figure().add_subplot(), made)
     assert alone.get_ylim()[0] == pytest.approx(0.55 * 0.2)
+
+
+def test_the_number_of_the_best_loss_is_in_the_unit_of_its_axis() -> None:
+    made = _history([5e5, 9e4, 6.47e4])
+    loss_history(axes := Figure().add_subplot(), made.assign(best_loss=("method", [6.47e4])))
+    assert axes.get_ylabel() == "Loss $J$ (10³)"
+    assert [text.get_text() for text in axes.texts] == ["64.7"]
