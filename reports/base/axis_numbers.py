@@ -7,8 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FixedFormatter
 
-WIDEST = 5
-"""Characters of a number beyond which its power of ten goes into the label of the axis."""
+WIDEST = 6.3
+"""Width of a number beyond which its power of ten goes into the label of the axis, mm."""
+_DIGIT, _OTHERS = 1.35, {".": 0.67, "−": 1.77}
+"""Widths of the characters of numbers on axes, mm."""
 DECADES = 1e3
 """Ratio of a logarithmic axis' limits above which powers of ten alone have numbers."""
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -53,16 +55,22 @@ def _scale(axis: Axis) -> int:
     shown = [at for at in axis.get_majorticklocs() if low <= at <= high]
     if isinstance(formatter, FixedFormatter) or not np.any(shown):
         return 0
-    if max(map(len, formatter.format_ticks(shown))) <= WIDEST and not formatter.get_offset():
+    if max(map(_width, formatter.format_ticks(shown))) <= WIDEST and not formatter.get_offset():
         return 0
     if axis.get_scale() == "log" and high > DECADES * low:
         axis.set_major_formatter(lambda value, _: _power(value) if is_power(value) else "")
         return 0
     exponent = 3 * int(np.floor(np.log10(np.abs(shown).max()) / 3.0))
-    if exponent != 0:
+    if exponent == 0:
+        axis.labelpad = 0.0
+    else:
         axis.set_major_formatter(lambda value, _: typeset(f"{value / 10.0**exponent + 0.0:g}"))
         axis.set_label_text(_scaled_label(axis.get_label_text(), exponent))
     return exponent
+
+
+def _width(number: str) -> float:
+    return sum(_OTHERS.get(letter, _DIGIT) for letter in number)
 
 
 def _scaled_label(label: str, exponent: int) -> str:

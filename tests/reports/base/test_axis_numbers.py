@@ -23,6 +23,7 @@ def _numbers(axes: Axes) -> list[str]:
         ("Force (N)", (-4e6, 4e6), "Force (MN)", "−4"),
         ("Mimicking error", (0.0, 0.001), "Mimicking error (10⁻³)", "0.2"),
         (r"Mean $|\theta|$ (°)", (0.0, 0.02), r"Mean $|\theta|$ (10⁻³ °)", "5"),
+        ("$u_y$ (mm)", (-0.05, 0.05), "$u_y$ (µm)", "−40"),
         ("Force (N)", (0.0, 0.08), "Force (N)", "0.02"),
     ],
 )
