@@ -22,6 +22,7 @@ from .panel_figure import Panel as Panel
 from .panel_figure import PanelFigure as PanelFigure
 from .structure_drawing import CLAMP_TINT as CLAMP_TINT
 from .structure_drawing import CLOAK_TINT as CLOAK_TINT
+from .structure_drawing import MARGIN as MARGIN
 from .structure_drawing import arrow as arrow
 from .structure_drawing import colour_bar as colour_bar
 from .structure_drawing import draw as draw

@@ -20,6 +20,8 @@ from reports.study import CLAMPED, RigidUnits, deformed
 from sim.core import Floats
 
 CLOAK_TINT, CLAMP_TINT = "#c9b3e0", "#4a4d52"
+MARGIN = 6.0
+"""Room about a structure at rest, mm."""
 
 
 def tints(
@@ -43,7 +45,7 @@ def draw(
     values: Floats | None = None,
     colour_map: Colormap | None = None,
     norm: Normalize | None = None,
-    margin: float = 6.0,
+    margin: float = MARGIN,
 ) -> PolyCollection:
     """Draws units and ligaments, units in `colours` (one each) or `values` through a colour map."""
     corners = deformed(structure, displacement)

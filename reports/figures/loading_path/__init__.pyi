@@ -26,6 +26,7 @@ from .snapshot_grid import SnapshotLayout as SnapshotLayout
 from .snapshot_grid import SnapshotStructure as SnapshotStructure
 from .snapshot_grid import shade_bar as shade_bar
 from .snapshot_grid import snapshot as snapshot
+from .snapshot_grid import snapshot_margin as snapshot_margin
 from .snapshot_grid import snapshots as snapshots
 from .structure_panels import DRIVE_TINT as DRIVE_TINT
 from .structure_panels import INTEREST_TINT as INTEREST_TINT

@@ -23,8 +23,8 @@ from reports.figures.loading_path.abscissa import (
     structures,
 )
 from reports.figures.loading_path.structure_panels import UnitColouring, shade_of
-from reports.panels import colour_bar, draw
-from reports.study import StudyResults, display_name, from_dataset
+from reports.panels import MARGIN, colour_bar, draw
+from reports.study import StudyResults, deformed, display_name, from_dataset
 
 LABEL, BAR, GAP = 6.0, 14.0, 1.2
 """Room for labels left of snapshots and for the bar of colours, and between snapshots; mm."""
@@ -201,13 +201,15 @@ def snapshots(
 ) -> None:
     """Draws all structures at all loads shown, from ``top`` (mm) on, an ``overlay`` on each."""
     shade, wide, tall = shade_of(study.problem, study.response), grid.width, grid.height
+    samples = grid.path.shown
+    margin = max(snapshot_margin(study.problem, row.part, samples, row.case) for row in grid.rows)
     for k, row in enumerate(grid.rows):
         for m, sample in enumerate(grid.path.shown):
             line, column = grid.at(k, m)
             axes = style.place(
                 figure, grid.left + column * wide, top + line * tall, wide - GAP, tall - GAP
             )
-            snapshot(axes, study.problem, row.part, sample, shade, row.case)
+            snapshot(axes, study.problem, row.part, sample, shade, row.case, margin)
             if overlay is not None:
                 overlay(axes, row, sample)
     _labels(figure, grid, top, *grid.labels)
@@ -231,14 +233,34 @@ def _labels(
         style.write_upwards(figure, grid.left - off, y, text, color=colour, fontsize=size)
 
 
+def snapshot_margin(
+    problem: Problem, part: xr.Dataset, samples: Sequence[int], case: int = 0
+) -> float:
+    """Finds the room (mm) about a structure at rest in which it is at the samples, uncut."""
+    structure = from_dataset(part, problem.lattice.spacing)
+    motion = part["displacement"].isel(case=case, time=list(samples))
+    frames = motion.transpose("time", "unit", "dof").values
+    points = np.stack([deformed(structure, frame) for frame in frames])
+    low, high = (find(structure.vertices, axis=(0, 1)) for find in (np.nanmin, np.nanmax))
+    beyond = max(float(np.nanmax(points - high)), float(np.nanmax(low - points)))
+    return MARGIN if beyond <= MARGIN else beyond + 1.0
+
+
 def snapshot(
-    axes: Axes, problem: Problem, part: xr.Dataset, sample: int, shade: UnitColouring, case: int = 0
+    axes: Axes,
+    problem: Problem,
+    part: xr.Dataset,
+    sample: int,
+    shade: UnitColouring,
+    case: int = 0,
+    margin: float = MARGIN,
 ) -> None:
-    """Draws one structure at one sample of its path, true to scale."""
+    """Draws one structure at one sample of its path, true to scale, `margin` mm about it."""
     structure = from_dataset(part, problem.lattice.spacing)
     frame = part["displacement"].isel(case=case, time=sample).transpose("unit", "dof").values
     values = shade.values(frame)
-    draw(axes, structure, frame, values=values, colour_map=shade.colours, norm=shade.norm)
+    colours = shade.colours
+    draw(axes, structure, frame, values=values, colour_map=colours, norm=shade.norm, margin=margin)
 
 
 def shade_bar(figure: Figure, shade: UnitColouring, place: tuple[float, float, float]) -> None:

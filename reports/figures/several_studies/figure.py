@@ -16,6 +16,7 @@ from reports.figures.loading_path import (
     shade_bar,
     shade_of,
     snapshot,
+    snapshot_margin,
     structures,
 )
 from reports.panels import Panel, PanelFigure
@@ -84,11 +85,14 @@ def _structures(
     top: float,
     side: float,
 ) -> None:
+    parts = [(study.problem, study.response.sel(structure=name)) for study, name in columns]
+    margin = max(snapshot_margin(problem, part, (0, -1)) for problem, part in parts)
     for k, (study, name) in enumerate(columns):
+        problem, part = parts[k]
         for row, sample in enumerate((0, -1)):
             left, y = LEFT + k * side, top + row * side
             axes = style.place(figure, left, y, side - GAP, side - GAP)
-            snapshot(axes, study.problem, study.response.sel(structure=name), sample, shade)
+            snapshot(axes, problem, part, sample, shade, margin=margin)
             if row == 0:
                 title, colour = display_name(study.problem, name), style.STRUCTURE_COLOURS[name]
                 axes.set_title(title, color=colour, fontsize=style.TEXT, pad=1.0)

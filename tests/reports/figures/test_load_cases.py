@@ -116,6 +116,27 @@ def test_snapshots_of_many_recordings_are_told_apart(two: StudyResults, tmp_path
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
 
 
+def test_snapshots_hold_a_structure_that_is_pulled(smile: StudyResults) -> None:
+    """Those of one that is pressed have the scale that they had."""
+    pulled = smile.response.assign(displacement=-smile.response["displacement"])
+    widths = []
+    for response in (smile.response, pulled):
+        study = replace(smile, datasets={"design": smile.design, "response": response})
+        path = abscissa.abscissa_of(study.problem, study.response)
+        grid = snapshot_grid.SnapshotLayout.of(study, path, 100.0)
+        snapshot_grid.snapshots(made := style.page(200.0), study, grid, grid.head)
+        *drawn, _ = made.axes
+        widths.append({float(np.ptp(axes.get_xlim())) for axes in drawn})
+        for axes in drawn:
+            (units,) = axes.collections
+            points = np.concatenate([path.vertices for path in units.get_paths()])
+            box = axes.viewLim
+            assert box.x0 <= points[:, 0].min() < points[:, 0].max() <= box.x1
+            assert box.y0 <= points[:, 1].min() < points[:, 1].max() <= box.y1
+    (pressed,), (of_pulled,) = widths
+    assert of_pulled > pressed + 15.0
+
+
 @pytest.mark.parametrize(
     ("columns", "rows", "wide"), [(15, 15, False), (40, 10, True), (10, 40, False)]
 )
