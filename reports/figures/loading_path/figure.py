@@ -97,6 +97,7 @@ def _history(study: StudyResults) -> str:
     """Tells what is drawn of the optimisation, and what is not."""
     before, beside = undrawn_evaluations(study.problem, study.design)
     return str(_PROSE["history"]).format(
+        cases=_PROSE["cases"] if _mean([study]) else "",
         before=_PROSE["before"].format(count=before) if before else "",
         beside=_PROSE["beside"].format(count=beside + 1) if beside else "",
     )
