@@ -13,7 +13,7 @@ from sim.core import Floats, Ints, SimulationError
 from sim.scene.expected_cost import count_unknowns, estimate_cost
 from sim.scene.scene import DOFS, Scene, displaced
 from sim.solvers import DISPLACEMENT, FORCE, FREE, PrescribedMotion, TimeSeries, single_motions
-from sim.structure import Lattice, polygons
+from sim.structure import Lattice, VoidAngleContact, polygons
 
 LOG = logging.getLogger(__name__)
 
@@ -25,6 +25,8 @@ JUMP, SOME_JUMP = 0.05, 0.01
 """Of a motion or force at its start, over its largest value: refused, and warned of."""
 ACROSS = 1e-9
 """Part of a motion, over its largest, up to which it is across a direction but for rounding."""
+SUM = 1e-6
+"""By which the sum of weights may be off one."""
 INSTANTS = 513
 """At which a motion is looked at."""
 LARGE = 100_000
@@ -57,6 +59,8 @@ def check_scene(
     if margin is not None and not margin > 0.0:
         what = f"a snap margin of {margin:g} bounds nothing; give one above zero, or None"
         raise SceneError(what, "objective.snap_margin")
+    for what, key in _meaningless(scene):
+        raise SceneError(what, key)
     found = [*_loose_units(scene), *_size(scene, asked)]
     for number, drive in enumerate(scene.loads.cases):
         if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(drive.motion)):
@@ -64,6 +68,26 @@ def check_scene(
     for warning in found:
         _warn(warning)
     return tuple(found)
+
+
+def _meaningless(scene: Scene) -> Iterator[tuple[str, str]]:
+    """Lists numbers that a loss or a law would be computed with and that have no meaning there."""
+    loads, asked, law = scene.loads, scene.objective, scene.structure.contact
+    shares, cases = [] if loads.weights is None else np.asarray(loads.weights).tolist(), loads.cases
+    if loads.weights is not None and not (
+        len(shares) == len(cases) and min(shares) >= 0.0 and abs(sum(shares) - 1.0) <= SUM
+    ):
+        what = f"the weights {shares} of {len(cases)} load cases; give one of each, zero or more,"
+        yield f"{what} of sum 1", "drive.weights"
+    for name in ("sharpness", "copy_sharpness"):
+        if not (sharpness := getattr(asked, name)) > 0.0:
+            yield f"a {name} of {sharpness:g} makes no mean; give 1 or more", "objective.robust"
+    if not loads.duration > 0.0:
+        yield f"a duration of {loads.duration:g} s; give one above zero", "horizon.duration"
+    if isinstance(law, VoidAngleContact) and law.cutoff_angle < law.barrier_angle:
+        what = f"contact begins at {law.cutoff_angle:g} rad, beyond its barrier of"
+        what += f" {law.barrier_angle:g} rad; give a cutoff_angle above the barrier_angle"
+        yield what, "contact.cutoff_angle"
 
 
 @cache

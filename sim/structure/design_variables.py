@@ -61,8 +61,18 @@ class DesignSpace:
         return np.flatnonzero(np.isin(self.lattice.group, self.groups))
 
     def vertices(self, design: Numbers) -> Array:
-        """Returns the vertices (n_vertices, 2) of a design vector (n_variables,), mm."""
-        start, shifting = self.lattice.vertices, jnp.asarray(design)[: self.basis.shape[1]]
+        """Returns the vertices (n_vertices, 2) of a design vector (n_variables,), mm.
+
+        Raises:
+            ValueError: it has another number of variables.
+        """
+        given = jnp.asarray(design)
+        if given.shape != (self.n_variables,):  # JAX takes others without a word
+            raise ValueError(
+                f"a design of shape {given.shape} is given where ({self.n_variables},) is wanted:"
+                " one number for each variable; take the design of this scene"
+            )
+        start, shifting = self.lattice.vertices, given[: self.basis.shape[1]]
         free_shifts = _product(self.basis, shifting).reshape(-1, 2)
         return _shifted(start, self.lattice.group, self.groups, free_shifts)
 

@@ -99,6 +99,14 @@ REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
     ),
     "no margin": (scene(snap_margin=0.0), "margin of 0 bounds nothing", "objective.snap_margin"),
     "below 0": (scene(snap_margin=-0.1), "margin of -0.1", "objective.snap_margin"),
+    "no mean": (scene(weights=np.array([3.0])), r"weights \[3.0\] of 1 load", "drive.weights"),
+    "too many": (scene(weights=np.array([0.5, 0.5])), "of 1 load cases; give", "drive.weights"),
+    "less than none": (scene(sharpness=-1.0), "sharpness of -1 makes", "objective.robust"),
+    "no time": (scene(duration=0.0), "duration of 0 s", "horizon.duration"),
+    "touches beyond a touch": (
+        scene(contact=sim.VoidAngleContact(0.3, 0.1)), "begins at 0.1 rad, beyond its barrier",
+        "contact.cutoff_angle",
+    ),
     "no such dof": (scene(supports=(sim.Clamp(LEFT, UNKNOWN),)), "no 'uz'; .*ux, uy", "supports"),
 }  # fmt: skip
 

@@ -26,6 +26,13 @@ def test_zero_design_is_the_lattice_itself() -> None:
     np.testing.assert_array_equal(space.vertices(jnp.zeros(space.n_variables)), lattice.vertices)
 
 
+@pytest.mark.parametrize("more", [-1, 1])
+def test_a_design_of_another_scene_is_refused(more: int) -> None:
+    space = design_space(rotating_squares(), RING, MIDDLE)
+    with pytest.raises(ValueError, match=f"where .{space.n_variables},. is wanted"):
+        space.vertices(np.zeros(space.n_variables + more))
+
+
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=20)
 def test_no_design_changes_a_ligament_or_a_frozen_unit(seed: int) -> None:
