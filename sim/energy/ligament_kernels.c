@@ -203,23 +203,33 @@ void ligament_kernels_tangent(
     }
 }
 
+/* Rates along a direction: of the rotations of both units, of d, and of dW/dd. */
+typedef struct { double la, lb, ex, ey, fx, fy; } Rates;
+
+static inline Rates rates_of(const double *direction, const NetworkArrays *net, int64_t k, Rotated r, Second h) {
+    int64_t a = 3 * net->unit[2 * k], b = 3 * net->unit[2 * k + 1];
+    double la = direction[a + 2], lb = direction[b + 2];
+    double ex = direction[b] - direction[a] - r.pby * lb + r.pay * la;
+    double ey = direction[b + 1] - direction[a + 1] + r.pbx * lb - r.pax * la;
+    double fx = h.hxx * ex + h.hxy * ey + h.mx * (la + lb);
+    double fy = h.hxy * ex + h.hyy * ey + h.my * (la + lb);
+    return (Rates){la, lb, ex, ey, fx, fy};
+}
+
 void ligament_kernels_hessian_product(
     double *motion, const NetworkArrays *net, const Kinematics *kinematics,
     double *direction, double *out) {
     memset(out, 0, sizeof(double) * 3 * kinematics->n_turn);
     for (int64_t k = 0; k < net->n_unit; k++) {
         int64_t a = 3 * net->unit[2 * k], b = 3 * net->unit[2 * k + 1];
-        double la = direction[a + 2], lb = direction[b + 2];
         Rotated r = rotated(motion, kinematics->turn, net, k);
         Lengths l = lengths(motion, net, k, r.dx, r.dy);
         Forces f = forces(net, k, r.dx, r.dy, l, kinematics->shear[k]);
         Second h = second(net, k, r.dx, r.dy, l, kinematics->shear[k]);
+        Rates d = rates_of(direction, net, k, r, h);
+        double fx = d.fx, fy = d.fy, la = d.la, lb = d.lb;
         double torsion = 0.25 * net->law[3 * k + 1] * l.rest * l.rest, bending = net->law[3 * k + 2];
-        double ex = direction[b] - direction[a] - r.pby * lb + r.pay * la;
-        double ey = direction[b + 1] - direction[a + 1] + r.pbx * lb - r.pax * la;
-        double fx = h.hxx * ex + h.hxy * ey + h.mx * (la + lb);
-        double fy = h.hxy * ex + h.hyy * ey + h.my * (la + lb);
-        double common = h.mx * ex + h.my * ey + torsion * (la + lb);
+        double common = h.mx * d.ex + h.my * d.ey + torsion * (la + lb);
         out[a] -= fx;
         out[a + 1] -= fy;
         out[a + 2] += fx * r.pay - fy * r.pax + common + bending * (la - lb)
@@ -231,46 +241,44 @@ void ligament_kernels_hessian_product(
     }
 }
 
+/* Adds what the force on one end gives its arm: dd = sign (R - I) dr, and the arm also turns with
+   the direction. */
+static inline void add_arm(
+    double sign, const double *turn, double spin, Rates d, Forces f, double *out) {
+    double c = turn[0], s = turn[1], hx = d.fx + spin * f.gy, hy = d.fy - spin * f.gx;
+    out[0] += sign * (c * hx + s * hy - d.fx);
+    out[1] += sign * (-s * hx + c * hy - d.fy);
+}
+
 void ligament_kernels_mixed(
     double *motion, const NetworkArrays *net, const Kinematics *kinematics,
     double *direction, int64_t *which, const Sensitivity *out, int64_t n_which) {
     for (int64_t w = 0; w < n_which; w++) {
-        int64_t k = which[w], ua = net->unit[2 * k], ub = net->unit[2 * k + 1], a = 3 * ua, b = 3 * ub;
-        double la = direction[a + 2], lb = direction[b + 2], shear = kinematics->shear[k];
+        int64_t k = which[w], a = net->unit[2 * k], b = net->unit[2 * k + 1];
+        double shear = kinematics->shear[k];
         Rotated r = rotated(motion, kinematics->turn, net, k);
         Lengths l = lengths(motion, net, k, r.dx, r.dy);
         Forces f = forces(net, k, r.dx, r.dy, l, shear);
         Second h = second(net, k, r.dx, r.dy, l, shear);
-        double ex = direction[b] - direction[a] - r.pby * lb + r.pay * la;
-        double ey = direction[b + 1] - direction[a + 1] + r.pbx * lb - r.pax * la;
-        double fx = h.hxx * ex + h.hxy * ey + h.mx * (la + lb);
-        double fy = h.hxy * ex + h.hyy * ey + h.my * (la + lb);
-        double ca = kinematics->turn[4 * ua], sa = kinematics->turn[4 * ua + 1];
-        double cb = kinematics->turn[4 * ub], sb = kinematics->turn[4 * ub + 1];
-        /* dd = (I - R_a) dr_a + (R_b - I) dr_b; the arms also turn with the direction */
-        double hx = fx + la * f.gy, hy = fy - la * f.gx;
-        out->arm[4 * k] += fx - (ca * hx + sa * hy);
-        out->arm[4 * k + 1] += fy - (-sa * hx + ca * hy);
-        hx = fx + lb * f.gy, hy = fy - lb * f.gx;
-        out->arm[4 * k + 2] += cb * hx + sb * hy - fx;
-        out->arm[4 * k + 3] += -sb * hx + cb * hy - fy;
-
+        Rates d = rates_of(direction, net, k, r, h);
+        add_arm(-1.0, kinematics->turn + 4 * a, d.la, d, f, out->arm + 4 * k);
+        add_arm(1.0, kinematics->turn + 4 * b, d.lb, d, f, out->arm + 4 * k + 2);
         /* k_l (L - l0) dL + k_s l0^2 gamma dgamma, with the rates dL and dgamma along the direction,
            by l0 and by the angle of the vector (over l0^2) */
         const double *law = net->law + 3 * k;
         double nx = r.dx / l.length, ny = r.dy / l.length;
-        double stretching = nx * ex + ny * ey;
-        double shearing = (nx * ey - ny * ex) / l.length - 0.5 * (la + lb);
+        double stretching = nx * d.ex + ny * d.ey;
+        double shearing = (nx * d.ey - ny * d.ex) / l.length - 0.5 * (d.la + d.lb);
         double vx = net->vector[2 * k], vy = net->vector[2 * k + 1];
         double by_rest = -law[0] * stretching + 2.0 * law[1] * l.rest * shear * shearing;
         double by_direction = -law[1] * shearing;
-        out->vector[2 * k] += fx + by_rest * vx / l.rest - by_direction * vy;
-        out->vector[2 * k + 1] += fy + by_rest * vy / l.rest + by_direction * vx;
+        out->vector[2 * k] += d.fx + by_rest * vx / l.rest - by_direction * vy;
+        out->vector[2 * k + 1] += d.fy + by_rest * vy / l.rest + by_direction * vx;
         out->law[3 * k] += l.stretch * stretching;
         out->law[3 * k + 1] += l.rest * l.rest * shear * shearing;
-        out->law[3 * k + 2] += l.bend * (lb - la);
+        out->law[3 * k + 2] += l.bend * (d.lb - d.la);
         out->natural[3 * k] -= law[0] * stretching;
         out->natural[3 * k + 1] -= law[1] * l.rest * l.rest * shearing;
-        out->natural[3 * k + 2] -= law[2] * (lb - la);
+        out->natural[3 * k + 2] -= law[2] * (d.lb - d.la);
     }
 }
