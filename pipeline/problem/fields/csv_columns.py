@@ -104,8 +104,8 @@ def read_columns(
     they are in these.
 
     Raises:
-        UserError: no such file, no such column, a unit of another dimension, no numbers in them, or
-            a cell that holds something else.
+        UserError: no such file, no such column, a unit of another dimension, no numbers in them, a
+            cell that holds something else, or more numbers than names.
     """
     import numpy as np
 
@@ -126,6 +126,7 @@ def read_columns(
     for line, row in enumerate(cells.rows[heading:], heading + 1):
         values = [cells.number(row, at) for _, at in columns]
         if None not in values:
+            _check_width(cells, heading, line, path)
             found.append(values)
         elif (unread := _unread(cells, row, columns)) is not None:
             remedy = "write plain numbers, without marks of thousands; empty what was not measured"
@@ -145,7 +146,7 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
 
     Raises:
         UserError: no such file or column, no unit or a wrong one, too few lines, or a line without
-            a finite number.
+            a finite number or with more numbers than the heading has names.
     """
     import numpy as np
 
@@ -168,12 +169,27 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
         raise UserError(f"only {len(lines)} lines of numbers", file=path, remedy=remedy)
     found = np.empty((len(lines), len(wanted)))
     for place, (number, row) in enumerate(lines):
+        _check_width(cells, heading, number, path)
         for column, (name, at) in enumerate((name, named[name]) for name in wanted):
             if (value := cells.number(row, at)) is None:
                 remedy = "mend or delete the line: all wanted columns need finite numbers"
                 raise _not_finite(path, number, name, cells.text(row, at), remedy)
             found[place, column] = value
     return np.asarray(found * factors)
+
+
+def _check_width(cells: CsvCells, heading: int, line: int, path: Path) -> None:
+    """Refuses numbers beyond the heading's columns, as commas that are decimal too make them."""
+    row, width = cells.rows[line - 1], len(cells.rows[heading - 1])
+    if cells.separator != "," or not any(column_units.NUMBERS.match(cell) for cell in row[width:]):
+        return
+    raise UserError(
+        "the line has more numbers than the heading has names",
+        file=path,
+        line=line,
+        value=",".join(row),
+        remedy="part columns by semicolons or tabs if commas are decimal; else name every column",
+    )
 
 
 def _unread(

@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -6,6 +7,7 @@ import pytest
 from pipeline.calibration.experiments.experiment import MeasuredValues
 from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
+from sim.core import Floats
 from tests.pipeline.calibration.specimens import (
     STIFFNESS,
     decay_set,
@@ -108,6 +110,11 @@ def test_the_names_of_a_file_are_told_not_its_preamble(told: str, tmp_path: Path
     assert "Load" in remedy
 
 
+def read_them(path: Path, wanted: dict[str, units.Dimension]) -> Floats:
+    """Reads columns with gaps."""
+    return csv_columns.read_columns(path, list(wanted), list(wanted.values()))
+
+
 @pytest.mark.parametrize("comment", ["# Zwick; compression\tof s1", "Operator; Meier\ttoday"])
 def test_a_separator_in_a_comment_is_none(comment: str, tmp_path: Path) -> None:
     path = tmp_path / "readings.csv"
@@ -116,6 +123,19 @@ def test_a_separator_in_a_comment_is_none(comment: str, tmp_path: Path) -> None:
     path.write_text(f"{comment}, again\ndisplacement (mm);force (N)\n1,5;-2,5e1\n\n2;3\n")
     found = csv_columns.read_quantities(path, WANTED)
     np.testing.assert_allclose(found, np.array([[1.5, -25.0], [2.0, 3.0]]))
+
+
+@pytest.mark.parametrize("read", [csv_columns.read_quantities, read_them])
+def test_commas_that_part_numbers_and_begin_decimals_are_refused(
+    read: Callable[..., Floats], tmp_path: Path
+) -> None:
+    path = tmp_path / "readings.csv"
+    path.write_text("displacement (mm),force (N)\n0,0\n0,5,1,25\n")
+    with pytest.raises(UserError, match="more numbers than the heading has names") as error:
+        read(path, WANTED)
+    assert error.value.line == 3
+    path.write_text("displacement (mm),force (N)\n0,0,,\n0.5,1.25,slipped\n")
+    assert read(path, WANTED).shape == (2, 2)
 
 
 @cases("calibration", "text, told")
