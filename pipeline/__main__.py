@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from functools import partial
 
 from pipeline.runtime import PREFIX, STAGES, Stage, UserError, cli, delegate, streams, version
-from pipeline.workflow.runs import run_watch
 
 _HELP = ("-h", "--help")
 
@@ -42,6 +41,8 @@ def _delegated() -> int | None:
         return None
     code = delegate(f"{PREFIX}pipeline", PREFIX + stage.module)
     if code is None:
+        from pipeline.workflow.runs import run_watch  # a client of the server starts without
+
         run_watch.end_with_run()
     return code
 

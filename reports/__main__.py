@@ -4,7 +4,6 @@ import sys
 from collections.abc import Sequence
 
 from pipeline.runtime import PREFIX, cli, delegate, streams
-from pipeline.workflow.runs import run_watch
 from reports.catalogue import OPTIONS, REPORTS, ReportCommand
 
 
@@ -42,5 +41,7 @@ if __name__ == "__main__":
     asked = REPORTS.get("".join(sys.argv[1:2]))
     code = delegate(f"{PREFIX}reports", PREFIX + asked.module) if asked else None
     if code is None:
+        from pipeline.workflow.runs import run_watch  # a client of the server starts without
+
         run_watch.end_with_run()
     cli.leave(main() if code is None else code)

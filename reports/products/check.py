@@ -47,7 +47,7 @@ def report(args: argparse.Namespace) -> None:
         UserError: the last of the faults of the problem and of its variants.
     """
     own = args.preset or ""
-    faults = variant_faults(args.problem, [own, *args.variants])
+    faults = variant_faults(args.problem, [own, *args.variants]) if args.variants else {}
     if own not in faults:
         _show(args)
     if faults:
@@ -58,9 +58,10 @@ def report(args: argparse.Namespace) -> None:
 
 
 def _show(args: argparse.Namespace) -> None:
-    """Draws a problem without faults; what its scene itself warns of is logged."""
+    """Draws a problem; what its scene itself warns of is logged."""
     asked = problem.load(args.problem, args.preset)
     scene = scene_of(asked, args.problem.parent)
+    problem.check_measured_constants(asked, args.problem.parent)
     found = [*doubts(asked, scene), *_unread(asked)]
     told = [cost_line(asked, scene), *(f"warning: {line}" for line in found)]
     with style.styled():
