@@ -332,22 +332,23 @@ def _mass(asked: Problem, lattice: Lattice) -> Iterator[str]:
     """Doubts a density that units moving in time cannot have as they are made."""
     if asked.static:
         return
-    made, density = asked.fabrication, asked.material.density
-    solid = made.solid_density * made.thickness
-    area = float(shapely.area(polygons(lattice, lattice.vertices)).sum()) * _GRAMS
-    least = 0.0 if made.print.infill is None else made.print.infill * solid
-    told = f"the units weigh {density * area:.3g} g in the simulation, but as made of"
+    made, share = asked.fabrication, asked.solid_share
+    area = float(shapely.area(polygons(lattice, lattice.vertices)).sum())
+    mass = asked.material.density * area * _GRAMS
+    solid, infill = mass / share, made.print.infill or 0.0
+    told = f"the units weigh {mass:.3g} g in the simulation, but as made of"
     told += f" {made.material}, {made.thickness:g} mm thick,"
-    matching = f"give `fabrication.thickness: {density / made.solid_density:.3g} mm`"
-    if density > (1.0 + SLACK) * solid:
+    if share > 1.0 + SLACK:
         yield (
-            f"{told} {solid * area:.3g} g even if solid; {matching} or more, another"
-            f" `fabrication.material`, or `material.density: {solid * 1e9:.3g} kg/m^2` or less"
+            f"{told} {solid:.3g} g even if solid; give"
+            f" `fabrication.thickness: {share * made.thickness:.3g} mm` or more, another"
+            " `fabrication.material`, or"
+            f" `material.density: {asked.material.density / share * 1e9:.3g} kg/m^2` or less"
         )
-    elif density < (1.0 - SLACK) * least:
+    elif share < (1.0 - SLACK) * infill:
         yield (
-            f"{told} {least * area:.3g} g at least with `fabrication.print.infill`"
-            f" {made.print.infill:g}; give {density / solid:.2g} there, or leave it out"
+            f"{told} {infill * solid:.3g} g at least with `fabrication.print.infill`"
+            f" {infill:g}; give {share:.2g} there, or leave it out"
         )
 
 

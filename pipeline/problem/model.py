@@ -225,11 +225,15 @@ class Problem(Section):
     @property
     def infill(self) -> float:
         """Returns the share of the parts' inside that is printed."""
+        if (infill := self.fabrication.print.infill) is not None:
+            return infill
+        return _STATIC_INFILL if self.static else min(1.0, self.solid_share)
+
+    @property
+    def solid_share(self) -> float:
+        """Returns the simulated mass of the units over that of solid ones as they are made."""
         made = self.fabrication
-        if made.print.infill is not None:
-            return made.print.infill
-        full = self.material.density / (made.solid_density * made.thickness)
-        return _STATIC_INFILL if self.static else min(1.0, full)
+        return self.material.density / (made.solid_density * made.thickness)
 
     @property
     def static(self) -> bool:
