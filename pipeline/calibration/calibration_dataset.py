@@ -19,6 +19,9 @@ from pipeline.calibration.least_squares import Fit
 from pipeline.datasets import SYNTHETIC_LABEL
 from sim.core import Floats
 
+FRAGMENT = "lay it over the keys of a problem file."
+"""Ends the line that heads the lines `material:` of a problem file."""
+
 
 def assemble_calibration(fit: Fit) -> tuple[xr.Dataset, Estimate]:
     """Assembles the dataset of a fit, and the values in it.
@@ -84,10 +87,6 @@ def _points(fit: Fit) -> dict[str, tuple[str, Floats]]:
 
 def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate(parts)
-
-
-FRAGMENT = "lay it over the keys of a problem file."
-"""Ends the line that heads the lines `material:` of a problem file."""
 
 
 def material_fragment(fit: Fit, found: Estimate, title: str, *, synthetic: bool) -> str:

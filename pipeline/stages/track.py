@@ -5,8 +5,6 @@ import json
 import logging
 import os
 import shlex
-import struct
-import zlib
 from contextlib import suppress
 from pathlib import Path
 
@@ -18,7 +16,6 @@ from pipeline.datasets import SYNTHETIC_LABEL, provenance
 from pipeline.runtime import (
     PREFIX,
     UserError,
-    begins_with,
     cli,
     found_in,
     sidecar_path,
@@ -34,6 +31,7 @@ from pipeline.tracking.frames import (
     frame_count,
     has_uneven_intervals,
     import_video,
+    is_own_drawing,
     load_cell,
     orientation_of,
     read_frames,
@@ -41,6 +39,7 @@ from pipeline.tracking.frames import (
     recording,
     rendered,
     video_length,
+    write_drawing,
 )
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import as_built, clamped_units, outlines_of_design
@@ -68,9 +67,6 @@ LOG = logging.getLogger(__name__)
 
 _MOVED = "x_px,y_px,u_px,v_px,rotation_deg"
 _ORANGE = (0, 80, 230)  # blue, green, red
-_DRAWN = "Software\0metacloak: python -m pipeline track"  # keyword and text of a PNG's chunk
-_PNG_HEAD = 33  # bytes of a PNG's signature and first chunk
-_IS_DRAWN = begins_with(_DRAWN)
 _UNTIMED = "frame_rate: how many pictures were taken in a second; without it they are not tracked"
 
 
@@ -122,7 +118,7 @@ def _init(video: Path, args: argparse.Namespace) -> None:
     out = args.out_dir / f"{video.stem}.yaml"
     if out.exists():
         raise _there_is_one(out)
-    drawn = sidecar_path(out, video, ending="_units.png", is_own=_IS_DRAWN, key="--out-dir")
+    drawn = sidecar_path(out, video, ending="_units.png", is_own=is_own_drawing, key="--out-dir")
     values = {
         "title": video.stem,
         "video": os.path.relpath(video.resolve(), out.resolve().parent),
@@ -135,7 +131,7 @@ def _init(video: Path, args: argparse.Namespace) -> None:
         "synthetic": rendered(video) or None,
     }
     note = SYNTHETIC_LABEL if rendered(video) else ""
-    _write_drawing(proposal.draw_proposal(first.image, found, note), drawn)
+    write_drawing(proposal.draw_proposal(first.image, found, note), drawn)
     with write_atomically(out) as aside:
         comments = ("What the first frame did not tell:", *doubts)
         aside.write_text(recording.recording_yaml(values, comments), encoding="utf-8")
@@ -178,7 +174,7 @@ def _pair(*pictures: Path, args: argparse.Namespace) -> None:
         usage = "python -m pipeline track pair FIRST.png LATER.png --at X Y --out motions.csv"
         raise UserError("two pictures, x and y of patches, and a file are wanted", remedy=usage)
     _check_positive("--side", args.side, "pixels, such as 41")
-    drawing = sidecar_path(args.out, *pictures, ending=".png", is_own=_IS_DRAWN)
+    drawing = sidecar_path(args.out, *pictures, ending=".png", is_own=is_own_drawing)
     before, after = read_pictures(*pictures)
     centres = np.reshape(args.at, (-1, 2))
     for centre in centres:
@@ -200,18 +196,7 @@ def _pair(*pictures: Path, args: argparse.Namespace) -> None:
         cv2.polylines(drawn, [corners], True, _ORANGE, 1, cv2.LINE_AA, 4)
     with write_atomically(args.out) as aside:
         aside.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    _write_drawing(drawn, drawing)
-
-
-def _write_drawing(picture: np.ndarray, path: Path) -> None:
-    """Writes a PNG with a text chunk (tEXt), by which a later call knows it for its own."""
-    import cv2
-
-    encoded = cv2.imencode(".png", picture)[1].tobytes()
-    text = b"tEXt" + _DRAWN.encode()
-    chunk = struct.pack(">I", len(text) - 4) + text + struct.pack(">I", zlib.crc32(text))
-    with write_atomically(path) as aside:
-        aside.write_bytes(encoded[:_PNG_HEAD] + chunk + encoded[_PNG_HEAD:])
+    write_drawing(drawn, drawing)
 
 
 def _import(path: Path, args: argparse.Namespace) -> None:

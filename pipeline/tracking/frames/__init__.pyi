@@ -6,8 +6,10 @@ from .frame import Frame as Frame
 from .frame import UntimedError as UntimedError
 from .frame_times import has_uneven_intervals as has_uneven_intervals
 from .frame_times import within_interval as within_interval
+from .picture import is_own_drawing as is_own_drawing
 from .picture import read_picture as read_picture
 from .picture import read_pictures as read_pictures
+from .picture import write_drawing as write_drawing
 from .picture_folder import pictures as pictures
 from .recording import LoadCellLog as LoadCellLog
 from .recording import Recording as Recording

@@ -76,25 +76,25 @@ def test_a_measured_motion_ends_where_the_study_does(
     np.testing.assert_allclose(moved, [0.0, -0.8])
 
 
-def test_places_that_no_figure_shows_are_doubted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (
+            "report: { places: [[30 mm, 60 mm]] }\n",
+            "`report.places` are shown where a motion in time",
+        ),
+        (
+            "designs: { void.disc.radius: [7 mm, 8 mm] }\n",
+            "the page of several `designs` is of harmonic drives, not of `linear_ramp`",
+        ),
+    ],
+)
+def test_what_no_figure_shows_is_doubted(
+    given: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    placed = "report: { places: [[30 mm, 60 mm]] }\n"
-    path = static.write(tmp_path, static.HOLE + placed, size=5, amplitude=3.0)
+    path = static.write(tmp_path, static.HOLE + given, size=5, amplitude=3.0)
     assert main(["check", "--problem", str(path), "--out-dir", str(tmp_path / "out")]) == 0
-    assert "warning: `report.places` are shown where a motion in time" in capsys.readouterr().err
-
-
-def test_designs_without_a_page_are_doubted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    several = "designs: { void.disc.radius: [7 mm, 8 mm] }\n"
-    path = static.write(tmp_path, static.HOLE + several, size=5, amplitude=3.0)
-    assert main(["check", "--problem", str(path), "--out-dir", str(tmp_path / "out")]) == 0
-    told = capsys.readouterr().err
-    assert (
-        "warning: the page of several `designs` is of harmonic drives, not of `linear_ramp`" in told
-    )
+    assert f"warning: {told}" in capsys.readouterr().err
 
 
 def test_measured_constants_are_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
