@@ -60,7 +60,7 @@ void coverage_accumulate(double *points, int64_t *start, double *shade, double *
 void patch_correlation_fit_patches(const FramePixels *scene, const Templates *templates, const FitStart *start, bool *chosen, int64_t size, int64_t steps, double *out, int64_t n_chosen);
 void template_cells_classify(float *brightness, float *weight, double contrast, double noise, uint8_t *kind, int64_t *span, int64_t n_span);
 void template_cells_unfold(float *brightness, float *weight, int64_t *span, float *nodes, int64_t n_span);
-void template_measure_distance(double *line, double *polygon, double *room, float *out, int64_t n_line, int64_t n_polygon);
+void template_measure_distance(double *line, double *polygon, double *scratch, float *out, int64_t n_line, int64_t n_polygon);
 void template_sample_spline(float *coefs, int64_t columns, double *x, double *y, double *out, int64_t n_coefs, int64_t n_x);
 
 #endif

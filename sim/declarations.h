@@ -217,13 +217,13 @@ typedef struct {
     int64_t n_drifts;
     double *kicks;
     int64_t n_kicks;
-    double reach;
-} Pace;
+    double longest;
+} Substeps;
 
 typedef struct {
     int64_t n_steps;
     double h;
-    Pace pace;
+    Substeps splitting;
     double *decay;
     int64_t n_decay;
     double *gain;
@@ -247,7 +247,7 @@ void distance_contact_kernels_add_hessian_product(double *motion, const ContactA
 void distance_contact_kernels_add_mixed(double *motion, const ContactArrays *contacts, const Kinematics *kinematics, double *direction, const Sensitivity *out);
 void distance_contact_kernels_add_tangent(double *motion, const ContactArrays *contacts, int64_t *free, const Matrix *matrix);
 int64_t equilibrium_path_adjoint(double *states, double *bar, const System *system, const Workspace *work, int64_t *which, const Bars *bars, int64_t n_states, int64_t n_which);
-void equilibrium_path_follow(double *loads, int64_t known, double *pace, double *bends, int64_t *trusted, bool leaves, double sense, const System *system, const Workspace *work, double relative, double absolute, double *drag, const Branch *branch, int64_t *counts, int64_t n_loads, double *returned);
+void equilibrium_path_follow(double *loads, int64_t known, double *progress, double *bends, int64_t *trusted, bool leaves, double sense, const System *system, const Workspace *work, double relative, double absolute, double *drag, const Branch *branch, int64_t *counts, int64_t n_loads, double *returned);
 bool esdirk_adjoint_adjoint(double *times, double *stage_u, double *stage_v, double *stage_a, double *bar_u, double *bar_v, const System *system, const Workspace *work, double *stages, int64_t *which, const Bars *bars, int64_t n_times, int64_t n_stages, int64_t n_which);
 void esdirk_march(double *times, int64_t first, double *drive, const System *system, const Workspace *work, double *stages, double *nodes, double tolerance, double *u, double *v, double *a, int64_t *counts, int64_t n_times, int64_t n_nodes, double *returned);
 double ligament_kernels_gradient(double *motion, const NetworkArrays *net, const Kinematics *kinematics, double *out);

@@ -47,13 +47,13 @@ static bool eliminate(int64_t front, double *values, double *scratch, const Fron
     for (int64_t j = 0; j < b; j++) memset(block + j * b + j, 0, sizeof(double) * (b - j));
     for (int64_t c = f->child[front]; c < f->child[front + 1]; c++)
         add_child(f->children[c], k, b, panel, block, scratch, f);
-    int own = k, rest = b, whole = k + b, info = 0;
-    lapack_dpotrf("L", &own, panel, &whole, &info);
+    int own = k, rest = b, height = k + b, info = 0;
+    lapack_dpotrf("L", &own, panel, &height, &info);
     if (info != 0 || !isfinite(panel[(k - 1) * (k + b) + k - 1])) return false;
     if (b == 0) return true;
     double *below = panel + k;
-    lapack_dtrsm("R", "L", "T", "N", &rest, &own, &plus, panel, &whole, below, &whole);
-    lapack_dsyrk("L", "N", &rest, &own, &minus, below, &whole, &plus, block, &rest);
+    lapack_dtrsm("R", "L", "T", "N", &rest, &own, &plus, panel, &height, below, &height);
+    lapack_dsyrk("L", "N", &rest, &own, &minus, below, &height, &plus, block, &rest);
     return true;
 }
 
@@ -108,18 +108,18 @@ void multifrontal_solve(const double *values, const Fronts *f, int64_t n, double
         int64_t front = down ? turn : 2 * f->n_update - 1 - turn;
         int64_t first = f->first[front], end = f->first[front + 1];
         const int64_t *rows = f->boundary + f->edge[front];
-        int rest = f->edge[front + 1] - f->edge[front], own = end - first, whole = own + rest;
+        int rest = f->edge[front + 1] - f->edge[front], own = end - first, height = own + rest;
         double *panel = (double *)values + f->panel[front], *below = panel + own, *x = right + first;
         if (down) {
-            lapack_dtrsv("L", "N", "N", &own, panel, &whole, x, &unit);
+            lapack_dtrsv("L", "N", "N", &own, panel, &height, x, &unit);
             if (rest)
-                lapack_dgemv("N", &rest, &own, &plus, below, &whole, x, &unit, &none, gathered, &unit);
+                lapack_dgemv("N", &rest, &own, &plus, below, &height, x, &unit, &none, gathered, &unit);
             for (int i = 0; i < rest; i++) right[rows[i]] -= gathered[i];
         } else {
             for (int i = 0; i < rest; i++) gathered[i] = right[rows[i]];
             if (rest)
-                lapack_dgemv("T", &rest, &own, &minus, below, &whole, gathered, &unit, &plus, x, &unit);
-            lapack_dtrsv("L", "T", "N", &own, panel, &whole, x, &unit);
+                lapack_dgemv("T", &rest, &own, &minus, below, &height, gathered, &unit, &plus, x, &unit);
+            lapack_dtrsv("L", "T", "N", &own, panel, &height, x, &unit);
         }
     }
     free(gathered);

@@ -27,13 +27,13 @@ class Branch(NamedTuple):
 
 @compiled
 def follow(
-    loads: Floats, known: int, pace: Floats, bends: Floats, trusted: Ints, leaves: bool,
+    loads: Floats, known: int, progress: Floats, bends: Floats, trusted: Ints, leaves: bool,
     sense: float, system: System, work: Workspace, relative: float, absolute: float, drag: Floats,
     branch: Branch, counts: Ints, n_loads: int = 0,
 ) -> tuple[int, float]:  # fmt: skip
     """Fills a branch with the equilibria at ``loads`` (n_loads, n_held), the first `known` kept.
 
-    `pace` (4,), see ``quasistatics.h``, is that with which these were found. `bends` (n_loads,
+    `progress` (4,), see ``quasistatics.h``, is that with which these were found. `bends` (n_loads,
     n_dofs) is by how much the path of a similar structure departs from its tangent between two
     loads, to be tried first where `trusted` (n_loads,). Where the path ends, the structure `leaves`
     it, or the branch ends as well. The critical mode of a branching is followed in the `sense` 1 or

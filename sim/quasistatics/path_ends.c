@@ -10,23 +10,23 @@ static const double CRITICAL = 1e-3;
 static const double UNLOADED = 1e-7;
 /* Movement at the end of a path that is a jump, mm. */
 static const double NOTICEABLE = 1e-2;
-/* Way of the held dofs by which a branching is passed, mm: nearer to it no state is stable enough to
-   be found. */
+/* Displacement of the held dofs by which a branching is passed, mm: nearer to it no state is stable
+   enough to be found. */
 static const double BEYOND = 1e-3;
 
 /* Makes fixed numbers without symmetry, the estimate of a mode. */
 void path_ends_scatter(double *x, int64_t n) { EACH(i, n) x[i] = sin(1.0 + i); }
 
-/* Goes on from the end of a path by damped motion; returns the part gone, negative without rest. */
+/* Goes on from the end of a path by damped motion; returns the part taken, negative without rest. */
 double path_ends_leave(
-    double *motion, double *load, double ahead, double *mode, double sense, double first,
+    double *motion, double *load, double overshoot, double *mode, double sense, double first,
     const Tolerance *t, const System *s, const Workspace *w, int64_t *counts, int *end) {
     *end = LIMIT_POINT;
     copy(w->saved, motion, s->n_mass);
     path_ends_scatter(mode, s->n_dofs);
     double value = snap_lowest_mode(s, w, mode, SWEEPS_AT_LOADS, EIGENVALUE);
-    increments_aim(motion, load, 1.0, s, w);
-    double way = length_of(w->product, s->held, s->n_held, s);
+    increments_prescribe(motion, load, 1.0, s, w);
+    double stroke = length_of(w->product, s->held, s->n_held, s);
     total_locate(motion, s, &w->kinematics);
     total_hessian_product(motion, s, &w->kinematics, w->product, w->force);
     double along = critical_modes_load(mode, s, w), force = 0.0;
@@ -36,11 +36,11 @@ double path_ends_leave(
     if (branches) {
         if (isfinite(first)) critical_modes_mix(mode, CRITICAL * first, unloaded, s, w);
         along = sense;
-        ahead = most(ahead, least(1.0, BEYOND / most(way, BEYOND)));
+        overshoot = most(overshoot, least(1.0, BEYOND / most(stroke, BEYOND)));
     }
     EACH(i, s->n_held) {
         int64_t d = s->held[i];
-        motion[d] = ahead == 1.0 ? load[i] : motion[d] + ahead * (load[i] - motion[d]);
+        motion[d] = overshoot == 1.0 ? load[i] : motion[d] + overshoot * (load[i] - motion[d]);
     }
     snap_push(motion, mode, along > 0.0 ? 1.0 : along < 0.0 ? -1.0 : along, s, w);
     if (!snap_follow_to_rest(motion, t, s, w, counts)) return -1.0;
@@ -49,7 +49,7 @@ double path_ends_leave(
         *end = BRANCHING;
     else if (!(length_of(w->trial, s->dofs, s->n_dofs, s) > NOTICEABLE))
         *end = SMOOTH;
-    return ahead;
+    return overshoot;
 }
 
 /* Moves the unloaded structure to its equilibrium; returns the smallest eigenvalue there, or -1. */

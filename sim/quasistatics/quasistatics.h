@@ -18,7 +18,7 @@ static const double SMALLEST_INCREMENT = 1e-8;
 
 /* Places in the counts that the solvers gather, as in newton.py. */
 enum { GRADIENTS, FACTORS, SHIFTED, INCREMENTS };
-/* Places in the pace of a path: the increment, the lowest eigenvalue and its rate, the first one. */
+/* Places in the progress of a path: the increment, the lowest eigenvalue and its rate, the first one. */
 enum { INCREMENT, VALUE, RATE, FIRST };
 /* How a way went on, as in path_ends.py. */
 enum { SMOOTH, LIMIT_POINT, BRANCHING };
@@ -53,13 +53,13 @@ typedef struct {
     double *bend;    /* growth of the tangent's step over the increment */
 } LimitPoint;
 
-/* What increments that failed, and those that did not, tell of the way ahead. */
+/* Bounds the next increment by those that failed and those that did not. */
 typedef struct {
-    double wall;   /* place that one failed to pass last, infinite once it is passed */
-    int failures;  /* of increments since a wall was passed */
-    double length; /* of the last one that did not fail */
+    double failed_at; /* place that one failed to pass last, infinite once it is passed */
+    int failures;     /* of increments since such a place was passed */
+    double length;    /* of the last one that did not fail */
     LimitPoint limit;
-} Outlook;
+} StepControl;
 
 Balance newton_balance_of(double *motion, const System *s, const Workspace *w);
 double newton_median_stiffness(const System *s);
@@ -77,22 +77,23 @@ bool snap_follow_to_rest(
     double *motion, const Tolerance *t, const System *s, const Workspace *w, int64_t *counts);
 
 void increments_tangent_step(double *motion, const System *s, const Workspace *w);
-void increments_aim(
+void increments_prescribe(
     double *motion, double *load, double share, const System *s, const Workspace *w);
 double increments_trapezoidal_error(
-    double *motion, double *predicted, double gone, Outlook *outlook, const System *s,
+    double *motion, double *predicted, double taken, StepControl *control, const System *s,
     const Workspace *w);
 double increments_next(
-    double increment, double done, double way, const double *pace, const Outlook *outlook);
+    double increment, double done, double stroke, const double *progress,
+    const StepControl *control);
 double increments_predict(
-    double *motion, double *load, double share, double ahead, const LimitPoint *limit,
+    double *motion, double *load, double share, double requested, const LimitPoint *limit,
     double *predicted, const System *s, const Workspace *w, int64_t *counts);
 
-double limit_point_ratio(const LimitPoint *limit, double gone);
+double limit_point_ratio(const LimitPoint *limit, double taken);
 void limit_point_locate(
-    double *predicted, double gone, double noticed, LimitPoint *limit, const System *s,
+    double *predicted, double taken, double noticed, LimitPoint *limit, const System *s,
     const Workspace *w);
-void limit_point_bend(const LimitPoint *limit, double ahead, double *step, const System *s);
+void limit_point_bend(const LimitPoint *limit, double taken, double *step, const System *s);
 
 double critical_modes_load(const double *mode, const System *s, const Workspace *w);
 void critical_modes_mix(
@@ -100,7 +101,7 @@ void critical_modes_mix(
 
 void path_ends_scatter(double *mode, int64_t n);
 double path_ends_leave(
-    double *motion, double *load, double ahead, double *mode, double sense, double first,
+    double *motion, double *load, double overshoot, double *mode, double sense, double first,
     const Tolerance *t, const System *s, const Workspace *w, int64_t *counts, int *end);
 double path_ends_come_to_rest(
     double *motion, double *mode, double sense, const Tolerance *t, const System *s,

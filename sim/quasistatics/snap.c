@@ -115,7 +115,8 @@ static bool rodas3(
 }
 
 /* Follows the damped motion at fixed held dofs to its rest, a minimum. */
-bool snap_follow_to_rest(double *motion, const Tolerance *t, const System *s, const Workspace *w, int64_t *counts) {
+bool snap_follow_to_rest(
+    double *motion, const Tolerance *t, const System *s, const Workspace *w, int64_t *counts) {
     double *drag = t->drag;
     double h = INFINITY, energy[2];
     EACH(i, s->n_dofs) h = least(h, drag[s->dofs[i]]);

@@ -77,17 +77,17 @@ class StaticSolver:
         check_connected(self.topology)
         loads = drive.values(self.topology.held, self.passed)
         branch = _empty_branch(len(loads), self.topology.n_dofs)
-        counts, pace = np.zeros(4, dtype=np.int64), np.zeros(4)
+        counts, progress = np.zeros(4, dtype=np.int64), np.zeros(4)
         top = self.topology
         system = system_of(top, values)
         check_start(top, values, system.contacts, np.zeros(top.n_dofs))
-        reached, fraction = self._follow(values, loads, 0, pace, top, system, branch, counts)
+        reached, fraction = self._follow(values, loads, 0, progress, top, system, branch, counts)
         while self.continues and len(met := new_pairs(system.contacts)) > 0:
             top = top.coupling(met)
             system = system_of(top, values)
             _forget(branch, reached)
             reached, fraction = self._follow(
-                values, loads, reached, pace, top, system, branch, counts
+                values, loads, reached, progress, top, system, branch, counts
             )
         raise_new_pairs(system.contacts)
         if reached < len(loads):
@@ -99,8 +99,8 @@ class StaticSolver:
         return record.states.copy(), np.zeros_like(record.states), record
 
     def _follow(
-        self, values: ConcreteParameters, loads: Floats, known: int, pace: Floats, top: Topology,
-        system: System, branch: Branch, counts: Ints,
+        self, values: ConcreteParameters, loads: Floats, known: int, progress: Floats,
+        top: Topology, system: System, branch: Branch, counts: Ints,
     ) -> tuple[int, float]:  # fmt: skip
         """Follows the path on from its first `known` loads; see ``follow``."""
         bends, trusted = self._known(branch.states)
@@ -110,7 +110,7 @@ class StaticSolver:
         floor = max(self.absolute, rounding) * float(values.law[:, 0].max())
         drag = system.damping if (system.damping[top.free_dofs] > 0).all() else top.scale**2
         return follow(
-            loads, known, pace, bends, trusted, self.leaves, self.sense, system,
+            loads, known, progress, bends, trusted, self.leaves, self.sense, system,
             workspace(system, self.threads), self.relative, floor, drag, branch, counts,
         )  # fmt: skip
 

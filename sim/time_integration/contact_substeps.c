@@ -22,7 +22,7 @@ Flight contact_substeps_flight_of(const int64_t *watched, int64_t n_watched, int
     double *angle = calloc(4 * n_units, sizeof(double));
     return (Flight){
         .watched = watched, .n_watched = n_watched, .near = near, .units = near + n_watched,
-        .met = near + n_watched + n_units, .angle = angle, .rate = angle + n_units,
+        .listed = near + n_watched + n_units, .angle = angle, .rate = angle + n_units,
         .force = angle + 2 * n_units, .bar_held = angle + 3 * n_units};
 }
 
@@ -34,11 +34,11 @@ void contact_substeps_free(Flight *flight) {
 /* The dofs of the rotations of the two units that a ligament joins, and these. */
 typedef struct {
     int64_t a, b, turn_a, turn_b;
-} Joined;
+} EndDofs;
 
-static inline Joined joined_by(const System *system, int64_t k) {
+static inline EndDofs end_dofs(const System *system, int64_t k) {
     int64_t a = system->net.unit[2 * k], b = system->net.unit[2 * k + 1];
-    return (Joined){a, b, 3 * a + 2, 3 * b + 2};
+    return (EndDofs){a, b, 3 * a + 2, 3 * b + 2};
 }
 
 /* Energy of one void and its first two derivatives by the turn. */
@@ -53,31 +53,31 @@ static inline Slopes slopes_of(const System *system, int64_t k, int64_t side, do
 }
 
 /* Notes a unit beside a void that may come to contact, once, and where it is. */
-static void meet(int64_t unit, const double *u, const double *v, Flight *flight) {
-    if (flight->met[unit]) return;
-    flight->met[unit] = 1;
+static void list_unit(int64_t unit, const double *u, const double *v, Flight *flight) {
+    if (flight->listed[unit]) return;
+    flight->listed[unit] = 1;
     flight->units[flight->n_units++] = unit;
     flight->angle[unit] = u[3 * unit + 2];
     flight->rate[unit] = v[3 * unit + 2];
 }
 
 /* Notes the voids that may come to contact within `tau`, and the units beside them. */
-static void find(
+static void find_near_voids(
     double tau, const double *u, const double *v, const System *system, Flight *flight) {
     const NetworkArrays *net = &system->net;
-    EACH(i, flight->n_units) flight->met[flight->units[i]] = 0;
+    EACH(i, flight->n_units) flight->listed[flight->units[i]] = 0;
     flight->n_near = flight->n_units = 0;
     EACH(i, flight->n_watched) {
         int64_t k = flight->watched[i];
-        Joined by = joined_by(system, k);
+        EndDofs by = end_dofs(system, k);
         double turn = u[by.turn_a] - u[by.turn_b];
         double turning = tau * (v[by.turn_a] - v[by.turn_b]);
         double one = net->void_[2 * k] + turn + least(turning, 0.0);
         double other = net->void_[2 * k + 1] - turn - most(turning, 0.0);
         if (least(one, other) < net->contact[3 * k + 2] + MARGIN) {
             flight->near[flight->n_near++] = k;
-            meet(by.a, u, v, flight);
-            meet(by.b, u, v, flight);
+            list_unit(by.a, u, v, flight);
+            list_unit(by.b, u, v, flight);
         }
     }
 }
@@ -100,11 +100,11 @@ static double curvature_at(double energy, const double *law) {
 /* Counts the substeps that follow the barrier where the energy of each void can carry it: the
    frequency there is the root of the curvature times the two units' inverse inertias. */
 static int64_t count_substeps(
-    double tau, const Pace *pace, const System *system, const Flight *flight) {
+    double tau, const Substeps *splitting, const System *system, const Flight *flight) {
     double fastest = 0.0;
     EACH(i, flight->n_near) {
         int64_t k = flight->near[i];
-        Joined by = joined_by(system, k);
+        EndDofs by = end_dofs(system, k);
         double inverse_inertia =
             inverse_inertia_of(by.a, system) + inverse_inertia_of(by.b, system);
         if (inverse_inertia > 0.0) {
@@ -116,16 +116,16 @@ static int64_t count_substeps(
             fastest = most(fastest, SHARED * curvature * inverse_inertia);
         }
     }
-    double steps = fabs(tau) * sqrt(fastest) / pace->reach;
+    double steps = fabs(tau) * sqrt(fastest) / splitting->longest;
     return steps <= MOST ? (int64_t)ceil(most(steps, 1.0)) : MOST + 1;
 }
 
-/* Fills the moments of the barriers on the units that meet; tells whether none is passed. */
+/* Fills the moments of the barriers on the units at these voids; tells whether none is passed. */
 static bool fill_moments(const double *u, const System *system, Flight *flight) {
     EACH(i, flight->n_units) flight->force[flight->units[i]] = 0.0;
     EACH(i, flight->n_near) {
         int64_t k = flight->near[i];
-        Joined by = joined_by(system, k);
+        EndDofs by = end_dofs(system, k);
         EACH(side, 2) {
             Slopes of = slopes_of(system, k, side, u[by.turn_a] - u[by.turn_b]);
             if (!(of.energy < INFINITY)) return false;
@@ -136,7 +136,7 @@ static bool fill_moments(const double *u, const System *system, Flight *flight) 
     return true;
 }
 
-/* Adds tau v to the rotations of the units that meet. */
+/* Adds tau v to the rotations of the units at these voids. */
 static void drift(double tau, double *u, const double *v, const Flight *flight) {
     EACH(i, flight->n_units) {
         int64_t d = 3 * flight->units[i] + 2;
@@ -152,10 +152,10 @@ static void kick(double tau, double *v, const System *system, const Flight *flig
     }
 }
 
-/* Takes the units that meet through n substeps; tells whether no barrier is passed. */
+/* Takes the units at these voids through n substeps; tells whether no barrier is passed. */
 static bool take_substeps(
-    double tau, int64_t n, double *u, double *v, const Pace *pace, const System *system,
-    Flight *flight) {
+    double tau, int64_t n, double *u, double *v, const Substeps *splitting,
+    const System *system, Flight *flight) {
     EACH(i, flight->n_units) {
         int64_t unit = flight->units[i];
         u[3 * unit + 2] = flight->angle[unit];
@@ -163,23 +163,24 @@ static bool take_substeps(
     }
     double delta = tau / n;
     EACH(step, n) {
-        EACH(m, pace->n_kicks) {
-            drift(pace->drifts[m] * delta, u, v, flight);
+        EACH(m, splitting->n_kicks) {
+            drift(splitting->drifts[m] * delta, u, v, flight);
             if (!fill_moments(u, system, flight)) return false;
-            kick(pace->kicks[m] * delta, v, system, flight);
+            kick(splitting->kicks[m] * delta, v, system, flight);
         }
-        drift(pace->drifts[pace->n_drifts - 1] * delta, u, v, flight);
+        drift(splitting->drifts[splitting->n_drifts - 1] * delta, u, v, flight);
     }
     return true;
 }
 
-int64_t contact_substeps_fly(
-    double tau, double *u, double *v, const Pace *pace, const System *system, Flight *flight) {
-    find(tau, u, v, system, flight);
+int64_t contact_substeps_advance(
+    double tau, double *u, double *v, const Substeps *splitting, const System *system,
+    Flight *flight) {
+    find_near_voids(tau, u, v, system, flight);
     EACH(i, system->n_dofs) u[system->dofs[i]] += tau * v[system->dofs[i]];
     if (flight->n_near == 0) return 0;
-    for (int64_t n = count_substeps(tau, pace, system, flight); n <= MOST; n *= 2)
-        if (take_substeps(tau, n, u, v, pace, system, flight)) return n;
+    for (int64_t n = count_substeps(tau, splitting, system, flight); n <= MOST; n *= 2)
+        if (take_substeps(tau, n, u, v, splitting, system, flight)) return n;
     return -1;
 }
 
@@ -195,7 +196,7 @@ static void kick_adjoint(
     }
     EACH(i, flight->n_near) {
         int64_t k = flight->near[i];
-        Joined by = joined_by(system, k);
+        EndDofs by = end_dofs(system, k);
         double turning = -weight * (
             inverse_inertia_of(by.a, system) * bar_v[by.turn_a]
             - inverse_inertia_of(by.b, system) * bar_v[by.turn_b]);
@@ -223,13 +224,13 @@ static void drift_adjoint(
 
 /* Adjoint of `take_substeps` from its end; the states come back as they went, to rounding. */
 static void substeps_adjoint(
-    double tau, int64_t n, double *u, double *v, double *bar_u, double *bar_v, const Pace *pace,
-    const System *system, Flight *flight, const Bars *bars) {
+    double tau, int64_t n, double *u, double *v, double *bar_u, double *bar_v,
+    const Substeps *splitting, const System *system, Flight *flight, const Bars *bars) {
     double delta = tau / n;
-    EACH(step, n) for (int64_t m = pace->n_kicks; m >= 0; m--) {
-        drift_adjoint(pace->drifts[m] * delta, u, v, bar_u, bar_v, system, flight);
+    EACH(step, n) for (int64_t m = splitting->n_kicks; m >= 0; m--) {
+        drift_adjoint(splitting->drifts[m] * delta, u, v, bar_u, bar_v, system, flight);
         if (m > 0) {
-            double weight = pace->kicks[m - 1] * delta;
+            double weight = splitting->kicks[m - 1] * delta;
             fill_moments(u, system, flight);
             kick(-weight, v, system, flight);
             kick_adjoint(weight, u, bar_u, bar_v, system, flight, bars);
@@ -237,19 +238,19 @@ static void substeps_adjoint(
     }
 }
 
-void contact_substeps_fly_back(
-    double tau, double *u, double *v, double *bar_u, double *bar_v, const Pace *pace,
+void contact_substeps_advance_adjoint(
+    double tau, double *u, double *v, double *bar_u, double *bar_v, const Substeps *splitting,
     const System *system, Flight *flight, const Bars *bars) {
-    int64_t n = contact_substeps_fly(tau, u, v, pace, system, flight);
+    int64_t n = contact_substeps_advance(tau, u, v, splitting, system, flight);
     EACH(i, flight->n_units) {
         int64_t d = 3 * flight->units[i] + 2;
         if (system->free[d] < 0) bar_u[d] = 0.0;
     }
     EACH(i, system->n_dofs) {
         int64_t d = system->dofs[i];
-        if (n == 0 || d % 3 != 2 || !flight->met[d / 3]) bar_v[d] += tau * bar_u[d];
+        if (n == 0 || d % 3 != 2 || !flight->listed[d / 3]) bar_v[d] += tau * bar_u[d];
     }
-    if (n > 0) substeps_adjoint(tau, n, u, v, bar_u, bar_v, pace, system, flight, bars);
+    if (n > 0) substeps_adjoint(tau, n, u, v, bar_u, bar_v, splitting, system, flight, bars);
     EACH(i, flight->n_units) {
         int64_t unit = flight->units[i], d = 3 * unit + 2;
         if (system->free[d] < 0) flight->bar_held[unit] = bar_u[d];

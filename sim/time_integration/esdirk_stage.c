@@ -37,7 +37,7 @@ bool esdirk_stage_factorise(
     return symmetric_factorise(&work->matrix);
 }
 
-/* A whole power, by squares. */
+/* A power of integer exponent, by squares. */
 static double power(double x, int exponent) {
     double of = 1.0;
     for (; exponent > 0; exponent /= 2, x *= x)

@@ -13,7 +13,7 @@ from sim.solvers import PrescribedMotion, check_masses, check_start
 from sim.structure import ConcreteParameters, VoidAngleContact
 from sim.time_integration import time_grid
 from sim.time_integration.coefficients import BLANES_MOAN, Splitting
-from sim.time_integration.contact_substeps import Pace
+from sim.time_integration.contact_substeps import Substeps
 from sim.time_integration.symplectic import Outputs, Steps, run, sweep_back
 from sim.vibration import highest_frequency
 
@@ -163,7 +163,7 @@ class ExplicitSolver:
         return Steps(
             n_steps,
             h,
-            Pace(self.splitting.drifts, self.splitting.kicks, FINER * self.splitting.stability),
+            Substeps(self.splitting.drifts, self.splitting.kicks, FINER * self.splitting.stability),
             *_kicks(system, self.splitting.kicks * h),
             held.reshape(n_steps, n_kicks, -1),
             _segment(n_steps),

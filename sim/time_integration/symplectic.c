@@ -124,9 +124,9 @@ static double advance(int64_t n, Motion *motion) {
         copy(motion->trace.u + at, motion->u, motion->n_dofs);
         copy(motion->trace.v + at, motion->v, motion->n_dofs);
         hold(n, m, motion->u, motion);
-        double tau = steps->pace.drifts[m] * steps->h;
-        int64_t substeps = contact_substeps_fly(
-            tau, motion->u, motion->v, &steps->pace, motion->system, &motion->flight);
+        double tau = steps->splitting.drifts[m] * steps->h;
+        int64_t substeps = contact_substeps_advance(
+            tau, motion->u, motion->v, &steps->splitting, motion->system, &motion->flight);
         if (substeps < 0) return INFINITY;
         if (m < motion->n_kicks) total += kick(n, m, motion);
     }
@@ -187,13 +187,13 @@ static void flight_back(
     const System *system = motion->system;
     const Flight *flight = &motion->flight;
     hold(n, m, u, motion);
-    contact_substeps_fly_back(
-        steps->pace.drifts[m] * steps->h, u, v, bar->u, bar->v, &steps->pace, system,
+    contact_substeps_advance_adjoint(
+        steps->splitting.drifts[m] * steps->h, u, v, bar->u, bar->v, &steps->splitting, system,
         &motion->flight, bar->bars);
     Around drive = around(n, m, bar->bars->drive, motion);
     EACH(i, system->n_held) {
         int64_t unit = system->held[i] / 3;
-        if (system->held[i] % 3 == 2 && flight->met[unit]) {
+        if (system->held[i] % 3 == 2 && flight->listed[unit]) {
             drive.last[i] += 0.5 * flight->bar_held[unit];
             drive.following[i] += 0.5 * flight->bar_held[unit];
         }

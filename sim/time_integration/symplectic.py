@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from sim.core import Floats, Ints, compiled
 from sim.energy import Bars, System, Workspace
-from sim.time_integration.contact_substeps import Pace
+from sim.time_integration.contact_substeps import Substeps
 
 
 class Steps(NamedTuple):
@@ -12,7 +12,7 @@ class Steps(NamedTuple):
 
     n_steps: int  # number of steps
     h: float  # step, s
-    pace: Pace  # coefficients of the flights, and of the substeps within them
+    splitting: Substeps  # coefficients of the flights, and of the substeps within them
     decay: Floats  # (n_kicks, n_dofs) of the kicks
     gain: Floats  # (n_kicks, n_dofs) of the kicks
     drive: Floats  # (n_steps, n_kicks, n_held) prescribed values at the kicks

@@ -41,7 +41,7 @@ typedef struct {
     int64_t n_watched;
     int64_t *near, n_near;                /* those that do in this flight */
     int64_t *units, n_units;              /* the units that these join */
-    int64_t *met;                         /* of each unit, whether it is among them */
+    int64_t *listed;                      /* of each unit, whether it is among them */
     double *angle, *rate, *force, *bar_held;  /* rotations at the start, their rates, moments, and
                                                  derivatives by held rotations, of each unit */
 } Flight;
@@ -50,14 +50,15 @@ typedef struct {
 Flight contact_substeps_flight_of(const int64_t *watched, int64_t n_watched, int64_t n_units);
 void contact_substeps_free(Flight *flight);
 /* Advances u and v (n_dofs,) by `tau` under the voids' barriers and nothing else. Held dofs stay
-   where they are and count as at rest. Returns the number of substeps taken by the units that
-   met, or -1 if they pass a barrier. */
-int64_t contact_substeps_fly(
-    double tau, double *u, double *v, const Pace *pace, const System *system, Flight *flight);
+   where they are and count as at rest. Returns the number of substeps taken by the units at
+   the voids, or -1 if they pass a barrier. */
+int64_t contact_substeps_advance(
+    double tau, double *u, double *v, const Substeps *splitting, const System *system,
+    Flight *flight);
 /* Takes derivatives by the end of a flight to its start, which is given in u and v: these are
    overwritten. `bar_held` of the flight receives those by the rotations of held units. */
-void contact_substeps_fly_back(
-    double tau, double *u, double *v, double *bar_u, double *bar_v, const Pace *pace,
+void contact_substeps_advance_adjoint(
+    double tau, double *u, double *v, double *bar_u, double *bar_v, const Substeps *splitting,
     const System *system, Flight *flight, const Bars *bars);
 
 #endif

@@ -32,13 +32,13 @@ void *aligned_room(int64_t count, int64_t bytes) {
 
 PixelLists compared_pixels_make(int64_t blocks) {
     int64_t pixels = blocks * PIXELS;
-    float *room = aligned_room(5 * pixels, sizeof(float));
+    float *numbers = aligned_room(5 * pixels, sizeof(float));
     return (PixelLists){
-        .x = room,
-        .y = room + pixels,
-        .brightness = room + 2 * pixels,
-        .steep = room + 3 * pixels,
-        .patch = room + 4 * pixels,
+        .x = numbers,
+        .y = numbers + pixels,
+        .brightness = numbers + 2 * pixels,
+        .steep = numbers + 3 * pixels,
+        .patch = numbers + 4 * pixels,
         .ends = malloc(sizeof(int64_t) * (size_t)(blocks + 1))};
 }
 
@@ -62,20 +62,20 @@ static const double *block_of(const FramePixels *scene, int64_t top, int64_t lef
     return scene->blocks + 6 * (scene->columns / SIZE * (top / SIZE) + left / SIZE);
 }
 
-static bool is_within(const Look *look, const double *pose, const double *middle) {
-    double x = middle[0] - look->x - pose[0], y = middle[1] - look->y - pose[1];
-    return x * x + y * y < look->reach * look->reach;
+static bool is_within(const Template *template, const double *pose, const double *middle) {
+    double x = middle[0] - template->x - pose[0], y = middle[1] - template->y - pose[1];
+    return x * x + y * y < template->reach * template->reach;
 }
 
 /* Fills where a block's pixels are on the unit. */
 static void place(
-    const Look *look, const double *pose, const double *at, int64_t top, Block *block) {
-    double late = top + MIDDLE - look->row, turn = pose[2] + late * look->drift_turn;
-    double c = cos(turn) / look->step, s = sin(turn) / look->step;
-    double vx = at[0] - look->x - pose[0] - late * look->drift_x;
-    double vy = at[1] - look->y - pose[1] - late * look->drift_y;
-    double down_x = at[4] - look->drift_x + look->drift_turn * vy;
-    double down_y = at[5] - look->drift_y - look->drift_turn * vx;
+    const Template *template, const double *pose, const double *at, int64_t top, Block *block) {
+    double late = top + MIDDLE - template->row, turn = pose[2] + late * template->drift_turn;
+    double c = cos(turn) / template->step, s = sin(turn) / template->step;
+    double vx = at[0] - template->x - pose[0] - late * template->drift_x;
+    double vy = at[1] - template->y - pose[1] - late * template->drift_y;
+    double down_x = at[4] - template->drift_x + template->drift_turn * vy;
+    double down_y = at[5] - template->drift_y - template->drift_turn * vx;
     float x = (float)(c * vx + s * vy), y = (float)(c * vy - s * vx);
     float ahead_x = (float)(c * at[2] + s * at[3]), ahead_y = (float)(c * at[3] - s * at[2]);
     float below_x = (float)(c * down_x + s * down_y), below_y = (float)(c * down_y - s * down_x);
@@ -89,15 +89,15 @@ static void place(
 }
 
 /* Fills the kinds of the cells that a block's pixels lie in; those at a template's rim are empty. */
-static void find_cells(const Look *look, Block *block) {
-    float middle = (float)((look->size - 1) / 2), end = (float)(look->size - 1);
-    int32_t size = (int32_t)look->size;
+static void find_cells(const Template *template, Block *block) {
+    float middle = (float)((template->size - 1) / 2), end = (float)(template->size - 1);
+    int32_t size = (int32_t)template->size;
     for (int k = 0; k < PIXELS; k++) {
         float u = least_single(most_single(block->x[k] + middle, 0.0f), end);
         float v = least_single(most_single(block->y[k] + middle, 0.0f), end);
         block->node[k] = (int32_t)v * size + (int32_t)u;
     }
-    for (int k = 0; k < PIXELS; k++) block->kind[k] = look->kind[(uint32_t)block->node[k]];
+    for (int k = 0; k < PIXELS; k++) block->kind[k] = template->kind[(uint32_t)block->node[k]];
 }
 
 /* Packs the lowest bits of eight bytes, as they lie in the memory of processors whose numbers begin
@@ -149,7 +149,8 @@ static int64_t append(
 }
 
 void compared_pixels_select(
-    const FramePixels *scene, const Look *look, const double *pose, Box box, PixelLists *lists) {
+    const FramePixels *scene, const Template *template, const double *pose, Box box,
+    PixelLists *lists) {
     int64_t n = 0, blocks = 0, wide = width_of(box);
     Block block;
     lists->ends[0] = 0;
@@ -159,9 +160,9 @@ void compared_pixels_select(
             for (int64_t left = box.left + SIZE * first; left < box.right;
                  left += QUARTERS * SIZE) {
                 const double *at = block_of(scene, top, left);
-                if (!is_within(look, pose, at)) continue;
-                place(look, pose, at, top, &block);
-                find_cells(look, &block);
+                if (!is_within(template, pose, at)) continue;
+                place(template, pose, at, top, &block);
+                find_cells(template, &block);
                 uint64_t chosen = choose(&block);
                 if (!chosen) continue;
                 const float *patch = lists->patch + wide * (top - box.top) + left - box.left;

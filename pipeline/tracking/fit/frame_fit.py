@@ -27,7 +27,7 @@ class PoseFitter:
 
     Attributes:
         camera: the camera.
-        templates: the units' looks.
+        templates: the units' appearance.
         full: (units,) information of each unit seen whole; zero until a first frame is fitted.
     """
 
@@ -117,21 +117,21 @@ class PoseFitter:
         size = self.templates.weight.shape[1]
         for part in left:
             begin = FitStart(*(values[part] for values in start))
-            looks = _part_of(self.templates, part)
+            templates = _part_of(self.templates, part)
             patch_correlation.fit_patches(
-                scene, looks, begin, wanted[part], size, FULL_STEPS, out[part]
+                scene, templates, begin, wanted[part], size, FULL_STEPS, out[part]
             )
 
 
-def _part_of(looks: Templates, units: slice) -> Templates:
+def _part_of(templates: Templates, units: slice) -> Templates:
     """Returns the templates of some of the units; arrays are shared."""
-    return looks._replace(
-        brightness=looks.brightness[units],
-        weight=looks.weight[units],
-        centre=looks.centre[units],
-        contrast=looks.contrast[units],
-        reach=looks.reach[units],
-        cells=TemplateCells(looks.cells.kind[units], looks.cells.span[units]),
+    return templates._replace(
+        brightness=templates.brightness[units],
+        weight=templates.weight[units],
+        centre=templates.centre[units],
+        contrast=templates.contrast[units],
+        reach=templates.reach[units],
+        cells=TemplateCells(templates.cells.kind[units], templates.cells.span[units]),
     )
 
 

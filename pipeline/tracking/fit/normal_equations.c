@@ -28,11 +28,11 @@ typedef struct {
 
 /* Finds the nodes about pixels, on a unit that has moved since they were selected. */
 static void locate(
-    const Look *look, const float *moved, const float *from_x, const float *from_y, int64_t count,
-    Window *window) {
-    float middle = (float)((look->size - 1) / 2), end = (float)(look->size - 2);
+    const Template *template, const float *moved, const float *from_x, const float *from_y,
+    int64_t count, Window *window) {
+    float middle = (float)((template->size - 1) / 2), end = (float)(template->size - 2);
     float c = cosf(moved[2]), s = sinf(moved[2]);
-    int32_t size = (int32_t)look->size;
+    int32_t size = (int32_t)template->size;
     for (int64_t n = 0; n < count; n++) {
         float dx = from_x[n] - moved[0], dy = from_y[n] - moved[1];
         float x = c * dx + s * dy, y = c * dy - s * dx;
@@ -55,10 +55,10 @@ static inline Node node_at(const float *numbers) {
 }
 
 /* Mixes the four nodes about pixels. */
-static void mix(const Look *look, int64_t count, Window *window) {
+static void mix(const Template *template, int64_t count, Window *window) {
     for (int64_t n = 0; n < count; n++) {
-        const float *upper = look->nodes + NUMBERS * (int64_t)(uint32_t)window->node[n];
-        const float *lower = upper + NUMBERS * look->size;
+        const float *upper = template->nodes + NUMBERS * (int64_t)(uint32_t)window->node[n];
+        const float *lower = upper + NUMBERS * template->size;
         float across = window->across[n], along = window->along[n], both = across * along;
         float left = 1.0f - across - along + both, right = across - both, low_left = along - both;
         Node low_right = both * node_at(lower + NUMBERS);
@@ -82,9 +82,10 @@ static void derive(const float *steep, int64_t count, Window *window) {
         float slope_x = window->slope_x[n], slope_y = window->slope_y[n];
         float bow_x = window->across[n] * slope_x - window->right[n];
         float bow_y = window->along[n] * slope_y - window->lower[n];
-        float face = window->face[n] + 0.5f * (bow_x + bow_y), told = most_single(steep[n], 0.0f);
+        float face = window->face[n] + 0.5f * (bow_x + bow_y);
+        float informative = most_single(steep[n], 0.0f);
         float x = window->x[n], y = window->y[n];
-        slope_x *= told, slope_y *= told;
+        slope_x *= informative, slope_y *= informative;
         basis[SLOPE_X][n] = slope_x, basis[SLOPE_Y][n] = slope_y;
         basis[TURN][n] = slope_x * y - slope_y * x;
         basis[FACE][n] = face;
@@ -95,11 +96,11 @@ static void derive(const float *steep, int64_t count, Window *window) {
 
 /* Fills residuals, with robust weights of Geman and McClure, and adds to the sums. */
 static void weigh(
-    const Look *look, double tight, const float *brightness, int64_t count, Window *window,
+    const Template *template, double tight, const float *brightness, int64_t count, Window *window,
     Equations *found) {
     float(*basis)[APART] = window->basis;
     const double *state = found->state;
-    float per_half = (float)(look->step / look->half), narrow = (float)tight;
+    float per_half = (float)(template->step / template->half), narrow = (float)tight;
     float gain = (float)state[3], offset = (float)state[4];
     float slope_x = (float)state[5] * per_half, slope_y = (float)state[6] * per_half;
     float full = 0.0f, left = 0.0f, curved = 0.0f, total = 0.0f, squares = 0.0f;
@@ -157,8 +158,9 @@ static void add_block(
 }
 
 /* Makes derivatives, so far apart, after the unknowns of those of the basis. */
-static void after_unknowns(const Look *look, const double *state, double *vector, int64_t apart) {
-    double steepness = state[3] / look->step, per_half = look->step / look->half;
+static void after_unknowns(
+    const Template *template, const double *state, double *vector, int64_t apart) {
+    double steepness = state[3] / template->step, per_half = template->step / template->half;
     double c = steepness * cos(state[2]), s = steepness * sin(state[2]);
     double x = vector[0], y = vector[apart];
     vector[0] = s * y - c * x, vector[apart] = -s * x - c * y;
@@ -169,15 +171,16 @@ static void after_unknowns(const Look *look, const double *state, double *vector
 
 /* Makes products of derivatives those of the unknowns; the lower triangle is read. */
 static void products_after_unknowns(
-    const Look *look, const double *state, double matrix[UNKNOWNS][UNKNOWNS]) {
+    const Template *template, const double *state, double matrix[UNKNOWNS][UNKNOWNS]) {
     for (int i = 0; i < UNKNOWNS; i++)
         for (int j = 0; j < i; j++) matrix[j][i] = matrix[i][j];
-    for (int i = 0; i < UNKNOWNS; i++) after_unknowns(look, state, matrix[i], 1);
-    for (int i = 0; i < UNKNOWNS; i++) after_unknowns(look, state, &matrix[0][i], UNKNOWNS);
+    for (int i = 0; i < UNKNOWNS; i++) after_unknowns(template, state, matrix[i], 1);
+    for (int i = 0; i < UNKNOWNS; i++) after_unknowns(template, state, &matrix[0][i], UNKNOWNS);
 }
 
 void normal_equations_gather(
-    const Look *look, const PixelLists *lists, int64_t blocks, double tight, Equations *found) {
+    const Template *template, const PixelLists *lists, int64_t blocks, double tight,
+    Equations *found) {
     _Alignas(ALIGNED) Window window;
     for (int n = 0; n < WINDOW; n++) window.basis[ONE][n] = 1.0f;
     memset(found->matrix, 0, sizeof found->matrix);
@@ -188,33 +191,34 @@ void normal_equations_gather(
         for (after = block + 1; after < blocks; after++)
             if (lists->ends[after + 1] - first > WINDOW) break;
         int64_t count = (lists->ends[after] - first) / LANES * LANES;
-        locate(look, found->moved, lists->x + first, lists->y + first, count, &window);
-        mix(look, count, &window);
+        locate(template, found->moved, lists->x + first, lists->y + first, count, &window);
+        mix(template, count, &window);
         derive(lists->steep + first, count, &window);
-        weigh(look, tight, lists->brightness + first, count, &window, found);
+        weigh(template, tight, lists->brightness + first, count, &window, found);
         add_products(count, &window, found);
         for (int64_t k = block; k < after; k++) {
             int64_t begin = lists->ends[k] - first, end = lists->ends[k + 1] - first;
             add_block(begin, end, &window, found->parts[k], found->score);
         }
     }
-    products_after_unknowns(look, found->state, found->matrix);
-    after_unknowns(look, found->state, found->score, 1);
-    double steepness = found->state[3] / look->step;
+    products_after_unknowns(template, found->state, found->matrix);
+    after_unknowns(template, found->state, found->score, 1);
+    double steepness = found->state[3] / template->step;
     found->information *= steepness * steepness;
     found->robust *= steepness * steepness;
     found->curved *= steepness * steepness;
 }
 
 void normal_equations_scatter(
-    const Look *look, const Equations *found, int64_t blocks, double scatter[UNKNOWNS][UNKNOWNS]) {
+    const Template *template, const Equations *found, int64_t blocks,
+    double scatter[UNKNOWNS][UNKNOWNS]) {
     memset(scatter, 0, sizeof(double) * UNKNOWNS * UNKNOWNS);
     for (int64_t block = 0; block < blocks; block++) {
         const float *part = found->parts[block];
         for (int i = 0; i < UNKNOWNS; i++)
             for (int j = 0; j <= i; j++) scatter[i][j] += (double)part[i] * part[j];
     }
-    products_after_unknowns(look, found->at, scatter);
+    products_after_unknowns(template, found->at, scatter);
 }
 
 /* Factors by Cholesky from the lower triangle; false if it is singular.

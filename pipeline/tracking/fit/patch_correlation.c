@@ -10,9 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Unknowns whose covariance is told: the pose, and the light's slopes, which look like shifts. */
-enum { TOLD_COUNT = 5, SQUARE = TOLD_COUNT * TOLD_COUNT };
-static const int TOLD[TOLD_COUNT] = {0, 1, 2, 5, 6};
+/* Unknowns whose covariance is reported: the pose, and the light's slopes, which mimic shifts. */
+enum { N_REPORTED = 5, SQUARE = N_REPORTED * N_REPORTED };
+static const int REPORTED[N_REPORTED] = {0, 1, 2, 5, 6};
 /* Columns of what is found of a unit, as `unpack` reads them. */
 enum { WHITE = UNKNOWNS, BLOCKS = WHITE + SQUARE, LAST = BLOCKS + SQUARE, WIDTH = LAST + 5 };
 static const double STRIDE = 1.4;    /* largest factor of a step */
@@ -33,7 +33,7 @@ static const int64_t LEAST_SIDE = 4; /* px, of a box */
 typedef struct {
     double contrast, scale, radius, noise, tight;
     int64_t most;
-} Aim;
+} FitParameters;
 
 /* What is allocated once for some units. */
 typedef struct {
@@ -41,7 +41,7 @@ typedef struct {
     uint8_t *kind;
     float *nodes;
     Equations equations;
-} Room;
+} Buffers;
 
 /* Rows and columns around a pixel, of whole blocks within the image. */
 static Box box_around(const FramePixels *scene, const double *middle, double radius) {
@@ -80,10 +80,10 @@ static void hold_pose(double matrix[UNKNOWNS][UNKNOWNS]) {
 
 /* Scale of the robust weights: wide until the unit has found its place. */
 static double next_scale(
-    double scale, double moved, double gain, const Aim *aim, const Equations *found) {
-    if (aim->tight > 0.0) return most(0.5 * scale, aim->tight);
-    double smallest = FLOOR * aim->contrast * gain;
-    if (aim->noise > 0.0 && moved < NEAR) return most(SCALE * aim->noise * gain, smallest);
+    double scale, double moved, double gain, const FitParameters *given, const Equations *found) {
+    if (given->tight > 0.0) return most(0.5 * scale, given->tight);
+    double smallest = FLOOR * given->contrast * gain;
+    if (given->noise > 0.0 && moved < NEAR) return most(SCALE * given->noise * gain, smallest);
     return least(scale, most(SCALE * sqrt(found->squares / found->weights), smallest));
 }
 
@@ -93,9 +93,9 @@ static double stride_of(const Equations *found) {
 }
 
 /* Fills how the unit has moved since its pixels were selected. */
-static void compare(const Look *look, Equations *found) {
+static void compare(const Template *template, Equations *found) {
     const double *state = found->state, *before = found->selected;
-    double c = cos(before[2]) / look->step, s = sin(before[2]) / look->step;
+    double c = cos(before[2]) / template->step, s = sin(before[2]) / template->step;
     double x = state[0] - before[0], y = state[1] - before[1];
     found->moved[0] = (float)(c * x + s * y), found->moved[1] = (float)(c * y - s * x);
     found->moved[2] = (float)(state[2] - before[2]);
@@ -105,32 +105,32 @@ static void compare(const Look *look, Equations *found) {
 
    Pixels are selected anew where it has moved on by more than a part of a pixel. */
 static double descend(
-    const FramePixels *scene, const Look *look, const Aim *aim, Box box, PixelLists *lists,
-    Equations *found) {
-    bool blind = aim->tight == 0.0, new = blind && aim->noise == 0.0;
-    int rough = aim->radius > LARGE ? 0 : 1;
-    double *state = found->state, moved = -1.0, way = UNKNOWN;
-    double scale = new ? UNKNOWN : most(aim->contrast * fabs(state[3]), aim->tight);
-    for (int64_t turn = new ? 0 : 1; turn <= aim->most; turn++) {
+    const FramePixels *scene, const Template *template, const FitParameters *given, Box box,
+    PixelLists *lists, Equations *found) {
+    bool blind = given->tight == 0.0, new = blind && given->noise == 0.0;
+    int rough = given->radius > LARGE ? 0 : 1;
+    double *state = found->state, moved = -1.0, travelled = UNKNOWN;
+    double scale = new ? UNKNOWN : most(given->contrast * fabs(state[3]), given->tight);
+    for (int64_t turn = new ? 0 : 1; turn <= given->most; turn++) {
         int part = turn == 0 ? 0 : turn == 1 && blind ? rough : ALL;
-        if (way > NEAR) {
-            compared_pixels_select(scene, look, state, box, lists);
-            way = 0.0;
+        if (travelled > NEAR) {
+            compared_pixels_select(scene, template, state, box, lists);
+            travelled = 0.0;
             memcpy(found->selected, state, sizeof found->selected);
         }
-        compare(look, found);
-        normal_equations_gather(look, lists, lists->blocks[part], 1.0 / (scale * scale), found);
+        compare(template, found);
+        normal_equations_gather(template, lists, lists->blocks[part], 1.0 / (scale * scale), found);
         if (turn == 0) hold_pose(found->matrix);
         if (!(found->weights > FEWEST * (part + 1) && normal_equations_invert(found))) return -1.0;
         solve(found, turn == 0 ? POSE : 0);
         const double *step = found->step;
-        moved = most(hypot(step[0], step[1]) * aim->scale, fabs(step[2]) * aim->radius);
+        moved = most(hypot(step[0], step[1]) * given->scale, fabs(step[2]) * given->radius);
         double stride = moved < NEAR ? stride_of(found) : 1.0;
         stride = least(stride, LONGEST / most(moved, 1e-9));
         advance(found, stride);
-        way += moved * stride;
+        travelled += moved * stride;
         double past = scale, gain = fabs(state[3]);
-        scale = turn == 0 ? aim->contrast * gain : next_scale(scale, moved, gain, aim, found);
+        scale = turn == 0 ? given->contrast * gain : next_scale(scale, moved, gain, given, found);
         if (turn > 0 && part == ALL && moved < STILL && scale > 0.7 * past) break;
     }
     return moved;
@@ -138,22 +138,22 @@ static double descend(
 
 /* Writes a unit's row as `unpack` reads it. */
 static void summarise(
-    const Look *look, const PixelLists *lists, const Equations *found, double full, double moved,
-    double *out) {
+    const Template *template, const PixelLists *lists, const Equations *found, double full,
+    double moved, double *out) {
     double scatter[UNKNOWNS][UNKNOWNS], half[UNKNOWNS], gain = found->state[3] * found->state[3];
-    normal_equations_scatter(look, found, lists->blocks[ALL], scatter);
+    normal_equations_scatter(template, found, lists->blocks[ALL], scatter);
     for (int i = 0; i < UNKNOWNS; i++) out[i] = found->state[i];
-    for (int i = 0; i < TOLD_COUNT; i++) {
-        const double *row = found->inverse[TOLD[i]];
+    for (int i = 0; i < N_REPORTED; i++) {
+        const double *row = found->inverse[REPORTED[i]];
         for (int j = 0; j < UNKNOWNS; j++) {
             half[j] = 0.0;
             for (int k = 0; k < UNKNOWNS; k++) half[j] += row[k] * scatter[k][j];
         }
-        for (int j = 0; j < TOLD_COUNT; j++) {
+        for (int j = 0; j < N_REPORTED; j++) {
             double total = 0.0;
-            for (int k = 0; k < UNKNOWNS; k++) total += half[k] * found->inverse[TOLD[j]][k];
-            out[BLOCKS + TOLD_COUNT * i + j] = total;
-            out[WHITE + TOLD_COUNT * i + j] = row[TOLD[j]];
+            for (int k = 0; k < UNKNOWNS; k++) total += half[k] * found->inverse[REPORTED[j]][k];
+            out[BLOCKS + N_REPORTED * i + j] = total;
+            out[WHITE + N_REPORTED * i + j] = row[REPORTED[j]];
         }
     }
     out[LAST] = sqrt(found->squares / found->weights);
@@ -166,20 +166,20 @@ static void summarise(
 /* Fills the row of one unit; it stays as it is if it cannot be fitted. */
 static void fit(
     const FramePixels *scene, const Templates *templates, const FitStart *start, int64_t unit,
-    int64_t size, int64_t steps, Room *room, double *out) {
+    int64_t size, int64_t steps, Buffers *buffers, double *out) {
     const TemplateCells *cells = &templates->cells;
     Box box = box_around(scene, start->middle + 2 * unit, start->radius[unit]);
     if (box.bottom - box.top < LEAST_SIDE || box.right - box.left < LEAST_SIDE) return;
-    compared_pixels_cut_out(scene, box, &room->lists);
+    compared_pixels_cut_out(scene, box, &buffers->lists);
     int64_t first = size * size * unit;
     template_cells_unfold(
         templates->brightness + first, templates->weight + first, cells->span + 2 * size * unit,
-        room->nodes, size);
-    memcpy(room->kind, cells->kind + first, (size_t)(size * size));  /* read here and there */
+        buffers->nodes, size);
+    memcpy(buffers->kind, cells->kind + first, (size_t)(size * size));  /* read here and there */
     const double *drift = start->drift + POSE * unit;
-    Look look = {
-        room->kind,
-        room->nodes,
+    Template template = {
+        buffers->kind,
+        buffers->nodes,
         size,
         templates->half,
         templates->step,
@@ -190,13 +190,13 @@ static void fit(
         drift[0],
         drift[1],
         drift[2]};
-    Aim aim = {
+    FitParameters given = {
         templates->contrast[unit], start->scale[unit], start->radius[unit],
         start->noise[unit],        start->tight[unit], steps};
-    Equations *found = &room->equations;
+    Equations *found = &buffers->equations;
     memcpy(found->state, start->state + UNKNOWNS * unit, sizeof found->state);
-    double moved = descend(scene, &look, &aim, box, &room->lists, found);
-    if (moved >= 0.0) summarise(&look, &room->lists, found, start->full[unit], moved, out);
+    double moved = descend(scene, &template, &given, box, &buffers->lists, found);
+    if (moved >= 0.0) summarise(&template, &buffers->lists, found, start->full[unit], moved, out);
 }
 
 /* Number of blocks of the largest of the chosen units. */
@@ -212,18 +212,18 @@ void patch_correlation_fit_patches(
     const FramePixels *scene, const Templates *templates, const FitStart *start, bool *chosen,
     int64_t size, int64_t steps, double *out, int64_t n_chosen) {
     int64_t blocks = most_blocks(start, chosen, n_chosen);
-    Room room = {.lists = compared_pixels_make(blocks)};
-    room.kind = aligned_room(size * size, 1);
-    room.nodes = aligned_room(4 * size * size, sizeof(float));
-    room.equations.parts = malloc(sizeof *room.equations.parts * (size_t)blocks);
-    memset(room.nodes, 0, sizeof(float) * 4 * (size_t)(size * size));
+    Buffers buffers = {.lists = compared_pixels_make(blocks)};
+    buffers.kind = aligned_room(size * size, 1);
+    buffers.nodes = aligned_room(4 * size * size, sizeof(float));
+    buffers.equations.parts = malloc(sizeof *buffers.equations.parts * (size_t)blocks);
+    memset(buffers.nodes, 0, sizeof(float) * 4 * (size_t)(size * size));
     for (int64_t unit = 0; unit < n_chosen; unit++) {
         for (int64_t k = 0; k < WIDTH; k++) out[WIDTH * unit + k] = NAN;
         if (chosen[unit])
-            fit(scene, templates, start, unit, size, steps, &room, out + WIDTH * unit);
+            fit(scene, templates, start, unit, size, steps, &buffers, out + WIDTH * unit);
     }
-    compared_pixels_free(&room.lists);
-    free(room.kind);
-    free(room.nodes);
-    free(room.equations.parts);
+    compared_pixels_free(&buffers.lists);
+    free(buffers.kind);
+    free(buffers.nodes);
+    free(buffers.equations.parts);
 }

@@ -18,13 +18,13 @@ from pipeline.tracking.fit.template_cells import TemplateCells
 from sim.core import Floats, Mask, Singles
 
 _POSE, _UNKNOWNS = 3, 7  # ux, uy, theta; gain, offset, slope in x, slope in y
-_TOLD = 5
-"""Unknowns whose covariance is told: the pose, and the light's slopes, which look like shifts."""
-WIDTH = _UNKNOWNS + 2 * _TOLD**2 + 5
+_REPORTED = 5
+"""Unknowns whose covariance is reported: the pose, and the light's slopes, which mimic shifts."""
+WIDTH = _UNKNOWNS + 2 * _REPORTED**2 + 5
 
 
 class Templates(NamedTuple):
-    """Holds the looks of the units in their own frames, and where they rest."""
+    """Holds the appearance of the units in their own frames, and where they rest."""
 
     brightness: Singles  # (units, rows, columns) at the nodes, y up
     weight: Singles  # (units, rows, columns) of the nodes, zero outside the unit and near the rim
@@ -126,9 +126,9 @@ def fit_patches(
 
 def unpack(out: Floats) -> PoseFits:
     """Names the columns of `fit_patches`' output."""
-    square = _TOLD**2
+    square = _REPORTED**2
     pose, light, white, blocks, rest = np.split(
         out, np.cumsum([_POSE, _UNKNOWNS - _POSE, square, square]), axis=1
     )
-    shape = (len(out), _TOLD, _TOLD)
+    shape = (len(out), _REPORTED, _REPORTED)
     return PoseFits(pose, light, white.reshape(shape), blocks.reshape(shape), *rest.T)

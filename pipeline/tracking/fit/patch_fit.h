@@ -1,4 +1,4 @@
-/* Correlates rigid patches with the pixels of a frame: what the files of this room share. */
+/* Correlates rigid patches with the pixels of a frame: what the files of this folder share. */
 #ifndef PIPELINE_PATCH_FIT_H
 #define PIPELINE_PATCH_FIT_H
 
@@ -13,7 +13,7 @@ enum { SIZE = 8, PIXELS = SIZE * SIZE, LANES = 8, ALIGNED = 64 };
 enum { EMPTY = 0, FLAT = 1, STEEP = 2 };
 /* ux, uy, theta; gain, offset, slope in x, slope in y. */
 enum { POSE = 3, UNKNOWNS = 7 };
-/* Blocks are listed by quarters: some of the first tell of the whole. */
+/* Blocks are listed by quarters: some of the first stand for all. */
 enum { QUARTERS = 4, ALL = QUARTERS - 1 };
 
 /* Room for so many numbers of some bytes each, aligned, to be freed. */
@@ -30,7 +30,7 @@ typedef struct {
     double x, y;
     double reach;
     double row, drift_x, drift_y, drift_turn;
-} Look;
+} Template;
 
 /* Rows and columns to look at, the first of each on a block. */
 typedef struct {
@@ -55,7 +55,8 @@ void compared_pixels_free(PixelLists *lists);
 void compared_pixels_cut_out(const FramePixels *scene, Box box, PixelLists *lists);
 /* Fills the lists with blocks of a first, a second and the other two quarters. */
 void compared_pixels_select(
-    const FramePixels *scene, const Look *look, const double *pose, Box box, PixelLists *lists);
+    const FramePixels *scene, const Template *template, const double *pose, Box box,
+    PixelLists *lists);
 
 /* The normal equations of one unit, and what they are solved by. */
 typedef struct {
@@ -74,10 +75,12 @@ typedef struct {
 /* Fills matrix, score and sums, of the unknowns, and the parts, with the pixels of so many blocks;
    `tight` is one over the squared scale of the robust weights. */
 void normal_equations_gather(
-    const Look *look, const PixelLists *lists, int64_t blocks, double tight, Equations *found);
+    const Template *template, const PixelLists *lists, int64_t blocks, double tight,
+    Equations *found);
 /* Fills the sum of the blocks' scores times themselves. */
 void normal_equations_scatter(
-    const Look *look, const Equations *found, int64_t blocks, double scatter[UNKNOWNS][UNKNOWNS]);
+    const Template *template, const Equations *found, int64_t blocks,
+    double scatter[UNKNOWNS][UNKNOWNS]);
 /* Fills the inverse of the matrix; false if it is singular. */
 bool normal_equations_invert(Equations *found);
 

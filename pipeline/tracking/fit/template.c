@@ -57,8 +57,8 @@ static void pass_edge(
 }
 
 void template_measure_distance(
-    double *line, double *polygon, double *room, float *out, int64_t n_line, int64_t n_polygon) {
-    double *square = room, *sign = room + n_line;
+    double *line, double *polygon, double *scratch, float *out, int64_t n_line, int64_t n_polygon) {
+    double *square = scratch, *sign = scratch + n_line;
     for (int64_t row = 0; row < n_line; row++) {
         for (int64_t k = 0; k < n_line; k++) square[k] = INFINITY, sign[k] = -1.0;
         for (int64_t k = 0; k < n_polygon; k++)

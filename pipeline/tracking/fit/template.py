@@ -82,16 +82,21 @@ class TemplateGrid:
     def signed_distance(self, polygon: Floats) -> Singles:
         """Measures from the nodes to a polygon about the centroid, positive inside, mm."""
         found = np.empty(self.x.shape, np.float32)
-        room = np.empty((2, len(self.line)))
-        measure_distance(self.line, np.ascontiguousarray(polygon, dtype=np.float64), room, found)
+        scratch = np.empty((2, len(self.line)))
+        measure_distance(self.line, np.ascontiguousarray(polygon, dtype=np.float64), scratch, found)
         return found
 
 
 @compiled
 def measure_distance(
-    line: Floats, polygon: Floats, room: Floats, out: Singles, n_line: int = 0, n_polygon: int = 0
+    line: Floats,
+    polygon: Floats,
+    scratch: Floats,
+    out: Singles,
+    n_line: int = 0,
+    n_polygon: int = 0,
 ) -> None:
-    """Measures from nodes (n_line, n_line) to a polygon, positive inside; has room (2, n_line)."""
+    """Measures from nodes (n_line, n_line) to a polygon, positive inside; scratch (2, n_line)."""
 
 
 def _smooth(value: Singles, low: float, high: float) -> Singles:
