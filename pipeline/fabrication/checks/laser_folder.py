@@ -179,8 +179,9 @@ def _compared(curve: Curve) -> Floats:
 
 def _check_kerfs(record: PackageRecord) -> Iterator[Fault]:
     """Checks that each kind of sheet is there for the set kerf, and its parts are larger."""
-    kerf, variants = record.settings.laser.kerf, record.drawings
+    variants = record.drawings
     for (kind, variant), nominal in variants.items():
+        kerf = record.settings.kerf_of(kind)
         if variant != NOMINAL or kerf == 0.0:
             continue
         if (kind, name := f"kerf{kerf:g}") in variants:

@@ -53,8 +53,10 @@ class PackageFolder:
         return path
 
     def _write_laser(self) -> None:
+        settings = self.problem.fabrication
         for kind, parts in self._flat_parts():
-            for sheet in laser_sheets(kind, parts, self.problem.fabrication.laser, self.file):
+            laser = settings.laser.model_copy(update={"kerf": settings.kerf_of(kind)})
+            for sheet in laser_sheets(kind, parts, laser, self.file):
                 ids = [part.id for part in sheet.parts]
                 write_dxf(sheet, self._path(f"laser/{sheet.name}.dxf", ids))
                 write_dxf(sheet, self._path(f"laser/{sheet.name}_r12.dxf"), "R12")

@@ -163,7 +163,8 @@ def _unit(
 def _file(file: str, parts: int, settings: Fabrication, printing: PrintEstimate | None) -> BillRow:
     """Describes a sheet, a plate or a fixture; notes what it is cut or printed in the place of."""
     note, count = _counted(parts, "part"), 1
-    if file.startswith("laser/") and settings.laser.kerf:
+    folder, _, name = file.partition("/")
+    if folder == "laser" and settings.kerf_of(name.partition("_")[0]):
         note += f"; {_variant_words(file, settings)}"
     if file.startswith(_LAYERED):
         note += f"; {settings.laser_route}"
@@ -172,7 +173,7 @@ def _file(file: str, parts: int, settings: Fabrication, printing: PrintEstimate 
         note += f"; {_EITHER}"
     if printing is not None:
         note += f"; {_print_words(printing, settings)}"
-    return BillRow(_KINDS[file.partition("/")[0]], file, count, note=note)
+    return BillRow(_KINDS[folder], file, count, note=note)
 
 
 def _shim(shim: Shim, settings: Fabrication, holders: Mapping[str, Sequence[str]]) -> BillRow:

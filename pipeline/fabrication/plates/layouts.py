@@ -64,6 +64,7 @@ def compensated(part: FlatPart, kerf: float, file: str) -> FlatPart:
         closed = f"a slot of {part.slot:g} mm" if narrow else "a slot or a hole"
         what = f"a kerf of {kerf:g} mm closes {closed} of part {part.id}"
         remedy = "lower it, or raise fabrication.slots.clearance and those of fabrication.coupon"
+        remedy += "; with a smaller fabrication.laser.aspect_ratio units are printed only"
         raise UserError(what, file=file, key="fabrication.laser.kerf", remedy=remedy)
     outline = shapely.orient_polygons(grown.simplify(_SHORT))
     holes = tuple(Circle(hole.centre, hole.diameter - kerf) for hole in part.holes)

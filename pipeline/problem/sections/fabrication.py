@@ -152,7 +152,8 @@ class Laser(Section):
     """Sheets for the laser cutter.
 
     Attributes:
-        kerf: width of the cut; the drawings are also written without compensation.
+        kerf: width of the cut; the drawings are also written without compensation. Those of units
+            that are printed only, for reference, are so alone.
         sheet: width and height of a sheet.
         margin: free rim of a sheet.
         gap: smallest distance of two parts.
@@ -310,6 +311,11 @@ class Fabrication(Section):
     def laser_cuts_units(self) -> bool:
         """Tests that units can be cut by laser, whole or in layers, in place of printing them."""
         return self.laser_layers == 1 or self.laminated
+
+    def kerf_of(self, kind: str) -> float:
+        """Looks up the cut that sheets of a kind make good; none where no laser cuts it, mm."""
+        drawn_for_reference = kind in {"units", "coupon"} and not self.laser_cuts_units
+        return 0.0 if drawn_for_reference else self.laser.kerf
 
     @property
     def laser_route(self) -> str:

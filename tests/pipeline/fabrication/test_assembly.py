@@ -22,7 +22,7 @@ from pipeline.fabrication.papers.pdf_paper import POINT, SIZES, room
 from pipeline.fabrication.parts import BuiltSpecimen
 from pipeline.fabrication.plates import PrintEstimate
 from sim.core import Floats
-from tests.pipeline.fabrication import handmade
+from tests.pipeline.fabrication import built, handmade
 from tests.pipeline.fabrication.handmade import ASKED
 from tests.tables import refused
 
@@ -140,6 +140,19 @@ def test_papers_tell_that_sheets_of_a_kerf_replace_nominal_ones(kerf: float) -> 
     assert notes[names[0]] == "1 part; at nominal size: cut it or the sheets of kerf0.15, not both"
     assert notes[names[1]] == "1 part; kerf made good: cut it or the nominal sheets, not both"
     assert "Cut either the drawings _nominal or those _kerf0.15" in steps
+
+
+def test_sheets_that_no_laser_cuts_are_in_place_of_no_others(tmp_path: Path) -> None:
+    """Units and coupon that are printed only are drawn for reference, at nominal size."""
+    built.write(tmp_path / "cloaked", {"laser": {"aspect_ratio": 1.0}})
+    notes = {row["id"]: row["note"] for row in read_bill(tmp_path / "cloaked/bom.csv")}
+    for kind in ("units", "coupon"):
+        (name,) = (name for name in notes if name.startswith(f"laser/{kind}_"))
+        assert name.endswith("_nominal.dxf")
+        assert "cut it" not in notes[name]
+        assert "print only" in notes[name]
+    combs = [name for name in notes if name.startswith("laser/comb_")]
+    assert combs == [f"laser/comb_sheet1_{variant}.dxf" for variant in VARIANTS]
 
 
 def test_shims_on_tabs_are_never_cut_at_nominal_size() -> None:
