@@ -1,12 +1,13 @@
 """Draws the specimen for its assembly, at true scale over as few pages as hold it."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
+from pipeline.fabrication.papers.label_places import Corners, name_box, name_places, number_places
 from pipeline.fabrication.papers.pdf_paper import BOLD, GREY, PALE, POINT, SIGNAL, Box, PdfDocument
 from pipeline.fabrication.parts import BuiltSpecimen, Ligament, Slot, Unit, column_letters
 from sim.core import Floats
@@ -23,16 +24,10 @@ WORST = 10
 """Number of the shims, bent most before any load, that are marked."""
 
 _CROSS = 3.0
-_ID, _SMALLEST = 6.5, 5.0  # points; on units too small for that an id reaches beyond
-_ASPECT = 0.75  # a letter's width to its size, with some room
 _NUMBER, _DIGIT = 7.5, (0.556, 0.71)  # points; width and height of a digit to its size
 _AROUND = 0.25  # mm around a number
 _FAR = 3.2  # mm from its shim, beyond which a line leads to it
 _RING = 2.5  # mm
-_DISTANCES = np.array([1.8, 2.4, 3.0, 3.7, 4.5, 5.5, 6.5, 8.0])  # mm from the shim's middle
-_TURNS = np.deg2rad(np.arange(0.0, 360.0, 15.0) + 45.0)
-_CROSSED = 3.0  # mm farther are as bad as the line of another shim beneath
-_COVERED = 100.0  # mm^-2 for what must not be covered
 
 
 @dataclass(frozen=True)
@@ -100,14 +95,24 @@ class AssemblyPlan:
         }
         self._worst = {ligament.number for ligament in specimen.bent[:WORST]}
         self._paths = _shim_paths(specimen)
+        self._names = self._place_names()
         self._numbers = self._place_numbers()
+
+    def _place_names(self) -> dict[str, tuple[float, float, float]]:
+        """Finds the middles of the units' ids and their sizes, clear of shims and arrows."""
+        units = self._specimen.units
+        outlines, names = [unit.outline for unit in units], [_name(unit) for unit in units]
+        places = name_places(outlines, names, [*self._paths.values()], [*_arrow_boxes(units)])
+        return dict(zip((unit.label for unit in units), places, strict=True))
 
     def _place_numbers(self) -> dict[int, tuple[float, float]]:
         """Finds the middles of the shims' numbers, clear of ids and arrows."""
         ligaments = [one for one in self._specimen.ligaments if one.number in self._paths]
         middles = {one.number: np.array(one.middle) for one in ligaments}
         sizes = {number: _number_size(self._number(number)) for number in middles}
-        taken = [box for unit in self._specimen.units for box in _written_boxes(unit)]
+        units = self._specimen.units
+        taken = [name_box(_name(unit), self._names[unit.label]) for unit in units]
+        taken += _arrow_boxes(units)
         return number_places(middles, sizes, self._paths, taken)
 
     def _number(self, ligament: int) -> str:
@@ -156,10 +161,9 @@ class AssemblyPlan:
         held = unit.label in {*self._specimen.clamped, *self._specimen.driven}
         fill = "#dccdee" if held else PALE
         self._sheet.polygon(np.asarray(unit.outline.exterior.coords)[:-1] + origin, fill)
-        name = _name(unit)
-        x, y, size = _name_place(unit, name)
+        x, y, size = self._names[unit.label]
         place = np.array([x, y - 0.12 * size]) + origin
-        self._sheet.text(place[0], place[1], name, size, BOLD, at="middle")
+        self._sheet.text(place[0], place[1], _name(unit), size, BOLD, at="middle")
         for stroke in unit.mark:
             self._sheet.line(np.asarray(stroke) + origin, 0.25, SIGNAL)
 
@@ -249,62 +253,8 @@ def _name(unit: Unit) -> str:
     return f"{unit.label}={unit.letter}" if unit.letter else unit.label
 
 
-def _written_boxes(unit: Unit) -> Iterator[tuple[float, float, float, float]]:
-    """Yields the boxes of a unit's id and of its arrow on the plan."""
-    x, y, size = _name_place(unit, _name(unit))
-    half = _ASPECT * len(_name(unit)) * size / POINT / 2
-    yield x - half, y - 0.45 * size / POINT, x + half, y + 0.45 * size / POINT
-    if unit.mark:
-        yield shapely.MultiLineString(list(unit.mark)).bounds
-
-
-def _name_place(unit: Unit, name: str) -> tuple[float, float, float]:
-    """Finds the middle of a unit, where it is widest, and the size of type that fits there."""
-    circle = shapely.maximum_inscribed_circle(unit.outline, tolerance=0.05)
-    (x, y), radius = circle.coords[0], float(circle.length)
-    fitting = 2.0 * radius * POINT / (_ASPECT * len(name))
-    return x, y, min(_ID, max(_SMALLEST, fitting))
-
-
-def number_places(
-    middles: Mapping[int, Floats],
-    sizes: Mapping[int, tuple[float, float]],
-    paths: Mapping[int, Floats],
-    taken: Sequence[tuple[float, float, float, float]],
-) -> dict[int, tuple[float, float]]:
-    """Finds the middle of each number, near to its shim and clear of all else.
-
-    Args:
-        middles: (2,) of shims, mm, by id.
-        sizes: width and height of the numbers' boxes, by id.
-        paths: (n, 2) lines of the shims, by id.
-        taken: boxes (left, bottom, right, top) of ids and arrows.
-    """
-    reach, turn = (grid.ravel() for grid in np.meshgrid(_DISTANCES, _TURNS, indexing="ij"))
-    aside = reach[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
-    lines, owners = [shapely.LineString(path) for path in paths.values()], np.array(list(paths))
-    tree, boxes = shapely.STRtree(lines), np.array(taken, dtype=float).reshape(-1, 4)
-    places = {}
-    for number, middle in middles.items():
-        half, spots = np.array(sizes[number]) / 2, middle + aside
-        corners = np.column_stack([spots - half, spots + half])
-        over, under = tree.query(shapely.box(*corners.T), "intersects")
-        crossed = np.bincount(over[owners[under] != number], minlength=len(spots))
-        cost = reach + _CROSSED * crossed + _COVERED * _covered(corners, _near(corners, boxes))
-        best = int(np.argmin(np.round(cost, 6)))
-        places[number] = (float(spots[best, 0]), float(spots[best, 1]))
-        boxes = np.vstack([boxes, corners[best]])
-    return places
-
-
-def _near(boxes: Floats, others: Floats) -> Floats:
-    """Selects the boxes (m, 4) of others that the one around boxes (n, 4) meets."""
-    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
-    return others[((others[:, :2] < high) & (others[:, 2:] > low)).all(axis=1)]
-
-
-def _covered(boxes: Floats, others: Floats) -> Floats:
-    """Measures the areas (n,) that boxes (n, 4) share with others (m, 4)."""
-    low = np.maximum(boxes[:, None, :2], others[None, :, :2])
-    high = np.minimum(boxes[:, None, 2:], others[None, :, 2:])
-    return np.asarray(np.clip(high - low, 0.0, None).prod(axis=-1).sum(axis=-1))
+def _arrow_boxes(units: Sequence[Unit]) -> Iterator[Corners]:
+    """Yields the boxes of the arrows on the plan."""
+    for unit in units:
+        if unit.mark:
+            yield shapely.MultiLineString(list(unit.mark)).bounds

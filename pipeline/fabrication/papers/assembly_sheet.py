@@ -230,6 +230,12 @@ def assembly_steps(
             "so, a stiffer one by gluing or screwing its units together, or the specimen is "
             "another structure than was simulated."
         )
+    if bare := specimen.without_dots:
+        have = "1 unit has" if len(bare) == 1 else f"{len(bare)} units have"
+        steps.append(
+            f"Dots for the tracking: {have} no room for a dot: {', '.join(bare)}. Nothing marks "
+            "these in a film but their own look: paint what fits on them by hand."
+        )
     return [*steps, "Lift the specimen out of the jig and move it by hand: no shim may slip."]
 
 

@@ -230,7 +230,10 @@ def _pins(specimen: BuiltSpecimen, settings: Fabrication) -> BillRow:
 def _dots(specimen: BuiltSpecimen) -> BillRow:
     """Counts the dots for the tracking."""
     count = sum(len(unit.markers) for unit in specimen.units)
-    return BillRow("dot", "dots", count, note="to be marked through the holes of the template")
+    note = "to be marked through the holes of the template"
+    if bare := specimen.without_dots:
+        note += f"; no room for one on {_counted(len(bare), 'unit')}: {', '.join(bare)}"
+    return BillRow("dot", "dots", count, note=note)
 
 
 def _foil(

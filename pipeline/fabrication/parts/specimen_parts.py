@@ -259,6 +259,11 @@ class BuiltSpecimen:
         """Letters by label, of the units that carry one instead of their id."""
         return {unit.label: unit.letter for unit in self.units if unit.letter}
 
+    @property
+    def without_dots(self) -> list[str]:
+        """Labels of the units that have no room for a tracking dot."""
+        return [unit.label for unit in self.units if not unit.markers]
+
     @cached_property
     def by_label(self) -> dict[str, Unit]:
         """Units by label."""

@@ -16,16 +16,18 @@ from pipeline.fabrication.papers import (
     write_bill,
     write_manifest,
 )
-from pipeline.fabrication.papers.assembly_plan import _DIGIT, _NUMBER, OVERLAP, number_places, tiles
+from pipeline.fabrication.papers.assembly_plan import _DIGIT, _NUMBER, OVERLAP, tiles
 from pipeline.fabrication.papers.assembly_sheet import assembly_steps
+from pipeline.fabrication.papers.label_places import name_box, name_places, number_places
 from pipeline.fabrication.papers.pdf_paper import POINT, SIZES, room
-from pipeline.fabrication.parts import BuiltSpecimen
+from pipeline.fabrication.parts import BuiltSpecimen, Circle
 from pipeline.fabrication.plates import PrintEstimate
 from sim.core import Floats
 from tests.pipeline.fabrication import built, handmade
 from tests.pipeline.fabrication.handmade import ASKED
 from tests.tables import refused
 
+DOT = Circle((0.0, 0.0), 2.0)
 DENSITY = 6.18e-9  # tonne/mm^2
 PROBLEM = Path(__file__).parents[3] / "experiments/fig2/problem.yaml"
 
@@ -279,6 +281,49 @@ def test_numbers_of_close_shims_cover_neither_each_other_nor_ids(spacing: float)
             box = box_around(np.array(spot))
             lines = (shapely.LineString(path) for k, path in paths.items() if k != number)
             assert not any(line.intersects(box) for line in lines)
+
+
+def test_ids_of_narrow_units_side_by_side_do_not_cover_each_other() -> None:
+    units = [shapely.box(left, 0.0, left + 3.0, 9.0) for left in (0.0, 3.5)]
+    names = ["AD15", "AE15"]
+    places = name_places(units, names, [], [])
+    boxes = [shapely.box(*name_box(*pair)) for pair in zip(names, places, strict=True)]
+    assert boxes[0].intersection(boxes[1]).area < 1e-9
+    for unit, box in zip(units, boxes, strict=True):
+        assert unit.contains(box.centroid)
+
+
+def test_an_id_stands_clear_of_shims_and_of_its_arrow() -> None:
+    """Where a triangle is widest its slots end."""
+    unit = shapely.Polygon([(0.0, 0.0), (8.0, 0.0), (0.0, 9.0)])
+    path, arrow = np.array([[2.5, 2.0], [2.0, 3.2]]), (0.2, 4.5, 1.0, 6.0)
+    (place,) = name_places([unit], ["C7"], [path], [arrow])
+    box = shapely.box(*name_box("C7", place))
+    assert unit.contains(box)
+    assert not box.intersects(shapely.LineString(path))
+    assert not box.intersects(shapely.box(*arrow))
+
+
+def test_an_id_that_nothing_covers_is_where_its_unit_is_widest() -> None:
+    square = shapely.box(0.0, 0.0, 12.0, 12.0)
+    path = np.array([[0.0, 0.0], [2.0, 2.0]])
+    (place,) = name_places([square], ["C7"], [path], [])
+    assert place == pytest.approx((6.0, 6.0, 6.5), abs=0.05)
+
+
+def test_papers_name_the_units_without_a_dot() -> None:
+    whole = handmade.specimen()
+    first, *others = whole.units
+    bare = dataclasses.replace(whole, units=(dataclasses.replace(first, markers=()), *others))
+    dotted = [dataclasses.replace(unit, markers=(DOT,)) for unit in bare.units[1:]]
+    bare = dataclasses.replace(bare, units=(bare.units[0], *dotted))
+    full = dataclasses.replace(bare, units=(dataclasses.replace(first, markers=(DOT,)), *dotted))
+    for specimen, named in ((bare, True), (full, False)):
+        rows = bill_rows(specimen, ASKED, DENSITY, {}, {}, 0.62)
+        (note,) = (row.note for row in rows if row.item == "dot")
+        assert ("; no room for one on 1 unit: A1" in note) == named
+        steps = " ".join(assembly_steps(specimen, ASKED, []))
+        assert ("1 unit has no room for a dot: A1." in steps) == named
 
 
 def box_around(spot: Floats) -> shapely.Polygon:
