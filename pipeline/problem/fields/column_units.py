@@ -67,7 +67,7 @@ def factor(unit: str | None, dimension: units.Dimension, name: str, path: Path, 
     """Computes how many working units a column's unit is.
 
     Raises:
-        UserError: it is missing, unknown, or of another dimension.
+        UserError: it is missing, unknown, of another dimension, or one that nobody uses.
     """
     heading = f"write the heading as {name} ({dimension.unit})"
     if unit is None:
@@ -77,6 +77,10 @@ def factor(unit: str | None, dimension: units.Dimension, name: str, path: Path, 
         )
     try:
         return units.parse_quantity(f"1 {_spelled(unit, dimension) or unit}", dimension)
+    except units.MisspeltUnitError as error:
+        raise UserError(
+            error.what, file=path, line=line, key=name, value=unit, remedy=error.remedy
+        ) from error
     except UserError as error:
         remedy = f"convert the numbers to {dimension.unit}, and {heading}"
         raise UserError(
@@ -102,6 +106,8 @@ def _spelled(word: str, dimension: units.Dimension) -> str | None:
 def _fits(word: str, dimension: units.Dimension) -> bool:
     try:
         units.parse_quantity(f"1 {word}", dimension)
+    except units.MisspeltUnitError:
+        return True
     except UserError:
         return False
     return True

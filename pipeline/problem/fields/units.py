@@ -60,6 +60,16 @@ _NUMBER = r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
 _POWER = r"[A-Za-z\u00b5\u03bc°]+(?:(?:\^|\*\*)-?\d)?"
 _UNIT = rf"(?P<unit>{_POWER}(?:\s*[*·/ ]\s*{_POWER})*)"
 _QUANTITY = re.compile(rf"\s*{_NUMBER}\s*(?:{_UNIT}|(?P<rest>\S.*?))?\s*")
+_MISSPELT = re.compile(
+    r"(?<![A-Za-z\u00b5\u03bc])(?:[MG](?:m|s|sec|rad|deg)|mPa)(?![A-Za-z])"
+    r"|^[MG]N(?!\s*/|.*-)"
+)
+"""Units that nobody in this field measures in, of which another spelling is one: mm, mN, MPa.
+
+Meganewtons are told in stiffnesses and moduli alone.
+"""
+_WORD = re.compile(r"(?<![A-Za-z])[MG](?:in|ft|mil|min)(?![A-Za-z])")
+"""Words, such as the Min of a column's title, that would be millions of inches or minutes."""
 _RAISED = str.maketrans({"²": "^2", "³": "^3"})
 
 
@@ -71,6 +81,10 @@ class Dimension:
     unit: str
     example: str
     also: tuple[str, ...] = ()
+
+
+class MisspeltUnitError(UserError):
+    """Reports a unit that is most likely another one, its letters in the wrong case."""
 
 
 LENGTH = Dimension("a length", "mm", "15 mm")
@@ -111,8 +125,8 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
     """Converts the quantity `text` to a float in the working unit of `dimension`.
 
     Raises:
-        UserError: no unit, an unknown one, one of another dimension, or a number that is not
-            finite or beyond all that is built.
+        UserError: no unit, an unknown one, one of another dimension or that nobody uses, or a
+            number that is not finite or beyond all that is built.
     """
     wanted = f'{dimension.name} is wanted here, e.g. "{dimension.example}"'
     if isinstance(text, bool) or not isinstance(text, str | int | float):
@@ -126,7 +140,12 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
         raise UserError(f"unknown unit {match['rest']!r}", remedy=f"{wanted}; known are {KNOWN}")
     if match["unit"] is None:
         raise UserError("the unit is missing", remedy=wanted)
-    value = float(match["number"]) * _factor(match["unit"], dimension, wanted)
+    factor = _factor(match["unit"], dimension, wanted)
+    if found := _MISSPELT.search(match["unit"]):
+        what = f"nobody measures {dimension.name} in {match['unit']!r}"
+        remedy = f"mind capitals: M is a million, m a thousandth; write {_meant(found[0])} if meant"
+        raise MisspeltUnitError(what, remedy=f"{remedy}, else convert; {wanted}")
+    value = float(match["number"]) * factor
     if not math.isfinite(value):
         raise UserError("not a finite number", remedy=wanted)
     if abs(value) > _GREATEST:
@@ -135,12 +154,19 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
     return value
 
 
+def _meant(unit: str) -> str:
+    """Spells a unit of a wrong prefix with the one that its letter is mistaken for."""
+    return f"M{unit[1:]}" if unit == "mPa" else f"m{unit[1:]}"
+
+
 @lru_cache
 def _factor(unit: str, dimension: Dimension, wanted: str) -> float:
     from pint.errors import UndefinedUnitError
 
     registry = _registry()
     try:
+        if _WORD.search(unit):
+            raise KeyError(unit)
         given = registry.Quantity(1.0, registry.parse_units(unit))
     except (UndefinedUnitError, KeyError, ValueError) as error:  # a zeroth power, a number
         raise UserError(f"unknown unit {unit!r}", remedy=f"{wanted}; known are {KNOWN}") from error

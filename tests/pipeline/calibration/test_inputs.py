@@ -79,6 +79,24 @@ def test_numbers_in_an_unknown_unit_are_to_be_converted(
     assert error.remedy == "convert the numbers to N, and write the heading as force (N)"
 
 
+@pytest.mark.parametrize("unit", ["Mm", "Gm"])
+@pytest.mark.parametrize("heading", ["displacement ({}),force (N)", "displacement,force\n{},N"])
+def test_a_unit_that_nobody_uses_is_refused(heading: str, unit: str, tmp_path: Path) -> None:
+    error = refusal(f"{heading.format(unit)}\n{ROWS}\n", tmp_path)
+    assert error.what == f"nobody measures a length in '{unit}'"
+    assert (error.key, error.value) == ("displacement", unit)
+    assert "write mm if meant" in (error.remedy or "")
+
+
+def test_a_word_that_ends_a_title_is_no_unit(tmp_path: Path) -> None:
+    """Min would be a million inches."""
+    path = tmp_path / "readings.csv"
+    path.write_text("way_Min,force\n1.5,2\n", encoding="utf-8")
+    wanted = {"way_Min": units.LENGTH, "force": units.FORCE}
+    found = csv_columns.read_columns(path, list(wanted), list(wanted.values()))
+    np.testing.assert_array_equal(found, [[1.5, 2.0]])
+
+
 @pytest.mark.parametrize("between", ["", "CH1,CH2", "# in mm, N"])
 @pytest.mark.parametrize("told", ["um,kN", "\u00b5m,kN", "\u03bcm,KN", "(um),(kN)"])
 def test_the_line_of_units_may_follow_others(between: str, told: str, tmp_path: Path) -> None:

@@ -43,6 +43,41 @@ def test_an_unknown_unit_is_told_the_known_ones(text: str, dimension: str) -> No
         parse_quantity(text, getattr(units, dimension))
 
 
+@pytest.mark.parametrize(
+    ("text", "dimension", "meant"),
+    [
+        ("1 Mm", units.LENGTH, "mm"),
+        ("1 Gm", units.LENGTH, "mm"),
+        ("1 Ms", units.TIME, "ms"),
+        ("1 MN", units.FORCE, "mN"),
+        ("1 MN mm", units.MOMENT, "mN"),
+        ("1 N Mm/rad", units.BENDING_STIFFNESS, "mm"),
+        ("1 N/Mm", units.STIFFNESS, "mm"),
+        ("1 Mrad", units.ANGLE, "mrad"),
+        ("1 mPa", units.MODULUS, "MPa"),
+    ],
+)
+def test_a_unit_that_nobody_uses_is_refused(text: str, dimension: Dimension, meant: str) -> None:
+    with refused("nobody measures", remedy=f"write {meant} if meant"):
+        parse_quantity(text, dimension)
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "value"),
+    [
+        ("1 MN/m", units.STIFFNESS, 1e3),
+        ("1 MN m^-1", units.STIFFNESS, 1e3),
+        ("1 MN/m²", units.MODULUS, 1.0),
+        ("1 Mg/m^2", units.AREAL_DENSITY, 1e-6),
+        ("1 MHz", units.FREQUENCY, 1e6),
+    ],
+)
+def test_millions_are_read_where_they_are_usual(
+    text: str, dimension: Dimension, value: float
+) -> None:
+    assert parse_quantity(text, dimension) == pytest.approx(value)
+
+
 @given(text=st.text(alphabet="019.e+- mNskrad/^*()[]_°'\n", max_size=200))
 def test_any_text_is_read_or_refused(text: str) -> None:
     with suppress(UserError):
