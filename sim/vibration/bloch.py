@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import jax
@@ -25,6 +25,8 @@ from sim.structure import ConcreteParameters, ContactModel, Lattice, VoidAngleCo
 TOLERANCE = 1e-10
 """Of the residual of a strained cell, relative to the axial stiffness times a millimetre."""
 STEPS, MAX_NEWTON = 20, 40
+LONGEST_PERIOD = 6
+"""That is tried of a lattice that does not repeat after the one asked for, steps."""
 CRUSHED = 0.5
 """Change of a ligament's length, as a share of it, from which on its law means nothing."""
 RIGHT = 1e-9
@@ -94,17 +96,18 @@ def cell_of(
 
     Raises:
         ValueError: the lattice is too small for a cell whose ligaments all end at units, or it does
-            not repeat so.
+            not repeat so; with a period after which it does, if there is a short one.
     """
-    first = ((lattice.index.max(axis=0) + 1) // np.array(period) - 1) // 2 * period
-    shift = np.floor_divide(lattice.index - first, period)
+    if min(period) < 1:
+        raise ValueError(f"a period of {period} lattice steps; give one or more each way")
+    first, shift = _cells(lattice, period)
     number = np.full(lattice.n_units, -1)
     unit = np.flatnonzero((shift == 0).all(axis=1))
     number[unit] = np.arange(len(unit))
     vectors = np.array([_period(lattice, first, step) for step in np.diag(period)])
-    home = {tuple(index): u for u, index in zip(unit, lattice.index[unit], strict=True)}
-    of_home = np.array([home[tuple(k)] for k in lattice.index - shift * period])
-    _check(lattice, of_home)
+    of_home = _of_home(lattice, period)
+    if not _repeats(lattice, of_home):
+        raise ValueError(f"the lattice does not repeat after {period} steps{_hint(lattice)}")
     begin, end = lattice.ligament_units.T
     mine = np.flatnonzero(number[begin] >= 0)
     if not isinstance(contact, VoidAngleContact):
@@ -135,11 +138,36 @@ def _period(lattice: Lattice, first: Ints, step: Ints) -> Floats:
     return np.asarray(lattice.site[there[0]] - lattice.site[here[0]])
 
 
-def _check(lattice: Lattice, of_home: Ints) -> None:
-    """Raises ValueError unless every unit is a copy of its like in the cell."""
+def _cells(lattice: Lattice, period: tuple[int, int]) -> tuple[Ints, Ints]:
+    """Finds the index (2,) at which the middle cell begins, and each unit's cell (n_units, 2)."""
+    first = ((lattice.index.max(axis=0) + 1) // np.array(period) - 1) // 2 * period
+    return first, np.floor_divide(lattice.index - first, period)
+
+
+def _of_home(lattice: Lattice, period: tuple[int, int]) -> Ints:
+    """Finds the like (n_units,) of each unit in the middle cell; -1 where it has none."""
+    _, shift = _cells(lattice, period)
+    home = {tuple(index): unit for unit, index in enumerate(lattice.index.tolist())}
+    return np.array([home.get(tuple(k), -1) for k in (lattice.index - shift * period).tolist()])
+
+
+def _repeats(lattice: Lattice, of_home: Ints) -> bool:
+    """Tells whether every unit is a copy of its like in the cell."""
     corners = lattice.padded(lattice.vertices - lattice.site[lattice.unit])
-    if not np.allclose(corners, corners[of_home], atol=1e-9 * lattice.spacing, equal_nan=True):
-        raise ValueError("the lattice does not repeat: only a uniform one has a unit cell")
+    near = 1e-9 * lattice.spacing
+    return bool(
+        (of_home >= 0).all() and np.allclose(corners, corners[of_home], atol=near, equal_nan=True)
+    )
+
+
+def _hint(lattice: Lattice) -> str:
+    """Tells the shortest period after which a lattice repeats at least twice each way."""
+    most = np.minimum((lattice.index.max(axis=0) + 1) // 2, LONGEST_PERIOD)
+    tried = product(range(1, int(most[0]) + 1), range(1, int(most[1]) + 1))
+    for period in sorted(tried, key=lambda steps: (steps[0] * steps[1], steps)):
+        if _repeats(lattice, _of_home(lattice, period)):
+            return f" of its units' index, but after {period}: give period={period}"
+    return ": only a uniform one has a unit cell"
 
 
 def strained(cell: UnitCell, gradient: Floats, free: Floats) -> StrainedCell:

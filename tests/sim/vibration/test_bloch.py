@@ -28,6 +28,17 @@ def test_a_larger_cell_only_folds_the_bands(lattice: Lattice, period: tuple[int,
     assert found == pytest.approx(expected, rel=1e-8, abs=1e-8 * expected[-1])
 
 
+def test_a_kagome_lattice_is_told_its_period() -> None:
+    """Its cell of two triangles takes two columns, and its bias repeats after two cells."""
+    with pytest.raises(ValueError, match=r"after \(2, 2\) .* after \(4, 2\): give period=\(4, 2\)"):
+        made(kagome(8, 8, 15.0, 1.5, 1.0), (2, 2))
+
+
+def test_a_period_of_no_steps_is_refused() -> None:
+    with pytest.raises(ValueError, match="one or more each way"):
+        made(rotating_squares(8), (0, 2))
+
+
 def test_two_branches_are_sound(cell: UnitCell) -> None:
     """Two of the bands go to zero with the wave number, in proportion to it."""
     along = np.array([1.0, 0.0])
