@@ -29,6 +29,7 @@ SUM = 1e-6
 """By which the sum of weights may be off one."""
 INSTANTS = 513
 """At which a motion is looked at."""
+_NUMBERS = (int, float, np.ndarray, np.generic, jax.Array)
 LARGE = 100_000
 """Unknowns from which on memory and time are told in advance."""
 
@@ -63,6 +64,7 @@ def check_scene(
         raise SceneError(what, key)
     found = [*_loose_units(scene), *_size(scene, asked)]
     for number, drive in enumerate(scene.loads.cases):
+        _law(drive, f"load case {number}")
         if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(drive.motion)):
             found += _drive(scene, drive, f"load case {number}", float(asked[-1]))
     for warning in found:
@@ -211,7 +213,7 @@ def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iter
             _series(one, case, end)
     instants = np.linspace(0.0, end, INSTANTS)
     with jax.ensure_compile_time_eval():  # under jax.jit, which is refused further on
-        course = np.asarray(drive.motion(instants)).reshape(INSTANTS, -1, 3)
+        course = _course(drive, instants, case)
     _clamped(scene, drive, course, case)
     whole = course
     if drive.control is not None:
@@ -231,6 +233,41 @@ def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iter
         _supported(scene, case)
         return
     yield from _jumps(scene, drive, whole, case)
+
+
+def _law(drive: PrescribedMotion, case: str) -> None:
+    """Refuses motions that are no laws: of numbers alone, which NumPy and JAX can compute."""
+    remedy = "give sim.TimeSeries(times, motion) of its values, or a NamedTuple of its numbers"
+    remedy += " whose __call__ takes times (n_times,) and computes in times.__array_namespace__()"
+    for one in single_motions(drive.motion):
+        if not _holds_numbers(one):
+            name = getattr(one, "__name__", type(one).__name__)
+            what = f"{case} moves by {name}, which is no law of motion; {remedy}"
+            raise SceneError(what, "drive")
+        try:
+            jax.eval_shape(lambda law, times: law(times), one, np.zeros(2))
+        except TypeError as error:
+            what = f"{case} moves by {type(one).__name__}, which JAX cannot differentiate by time"
+            raise SceneError(f"{what}; {remedy}", "drive") from error
+
+
+def _holds_numbers(motion: object) -> bool:
+    """Tells whether a motion can be computed, and is told by numbers alone."""
+    leaves = jax.tree.leaves(motion)
+    return callable(motion) and all(isinstance(leaf, _NUMBERS) for leaf in leaves)
+
+
+def _course(drive: PrescribedMotion, instants: Floats, case: str) -> Floats:
+    """Computes the motion (n_times, n_driven or 1, 3) at some times; refuses other shapes."""
+    course = np.asarray(drive.motion(instants), dtype=float)
+    n_times, n_units = len(instants), len(drive.units)
+    if course.shape not in {(n_times, 3), (n_times, n_units, 3)}:
+        raise SceneError(
+            f"{case} moves {n_units} units by motions of the shape {course.shape} at {n_times}"
+            f" times; give ux, uy, theta at each: ({n_times}, 3), or ({n_times}, {n_units}, 3)",
+            "drive",
+        )
+    return course.reshape(n_times, -1, 3)
 
 
 def _jumps(scene: Scene, drive: PrescribedMotion, course: Floats, case: str) -> Iterator[str]:

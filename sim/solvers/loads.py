@@ -20,7 +20,11 @@ the series's range."""
 
 
 class MotionLaw(Protocol):
-    """Describes the motion (n_times, 3) of the driven units: ux, uy (mm), theta (rad)."""
+    """Describes the motion (n_times, 3) of the driven units: ux, uy (mm), theta (rad).
+
+    A law of one's own is a NamedTuple of its numbers, which NumPy and JAX can compute: a plain
+    function hides them.
+    """
 
     def __call__(self, times: Numbers) -> Numbers:
         """Computes the motion at the given times, s."""

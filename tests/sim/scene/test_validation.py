@@ -1,11 +1,11 @@
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 import sim
-from sim.core import Floats, Ints
+from sim.core import Floats, Ints, Numbers
 from sim.quasistatics import StaticSolver
 from sim.scene import SceneError, check_scene
 from sim.solvers import FORCE, FREE, MotionLaw, solve_case
@@ -33,6 +33,39 @@ def crossed(unit: int) -> Floats:
     return vertices
 
 
+class Numeric(NamedTuple):
+    """Computed in NumPy alone."""
+
+    speed: float
+
+    def __call__(self, times: Numbers) -> Numbers:
+        return np.stack([0.0 * times, self.speed * times, 0.0 * times], axis=-1)
+
+
+class Short(NamedTuple):
+    """Of one component."""
+
+    speed: float
+
+    def __call__(self, times: Numbers) -> Numbers:
+        return self.speed * times
+
+
+class Own(NamedTuple):
+    """A law as it should be."""
+
+    speed: float
+
+    def __call__(self, times: Numbers) -> Numbers:
+        xp, still = times.__array_namespace__(), 0.0 * times
+        return xp.stack([self.speed * times, still, still], axis=-1)
+
+
+def ramped(times: Numbers) -> Numbers:
+    return Own(-3.0)(times)
+
+
+NOTHING: Any = 3.0
 UNKNOWN: Any = ("uz",)
 PULLED = sim.LinearRamp(1.0, 1.0, 0.3)
 FORCES = np.full((5, 3), FORCE)
@@ -41,6 +74,16 @@ REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
     "beyond": (scene(sim.LinearRamp(-400.0, 1.0)), "400 mm, further than", "drive.amplitude"),
     "far beyond": (scene(sim.LinearRamp(1e300, 1.0)), "further than", "drive.amplitude"),
     "shaken beyond": (scene(sim.Harmonic(90.0, 10.0), **MOVING), "90 mm", "drive.amplitude"),
+    "a plain function": (scene(ramped), "moves by ramped, .* give sim.TimeSeries", "drive"),
+    "a number for a law": (scene(NOTHING), "by float, which is no law of motion", "drive"),
+    "in NumPy alone": (scene(Numeric(1.0)), "JAX cannot .*__array_namespace__", "drive"),
+    "of one component": (
+        scene(Short(1.0)), r"5 units by motions of the shape \(513,\) .* give ux, uy, theta",
+        "drive",
+    ),
+    "of two components": (
+        scene(sim.TimeSeries(np.array([0.0, 1.0]), np.zeros((2, 2)))), r"\(513, 2\)", "drive",
+    ),
     "no supports": (scene(supports=()), "moves along as one; clamp", "supports"),
     "supports across": (scene(supports=(sim.Clamp(LEFT, ("uy",)),)), "moves along", "supports"),
     "supports across, by a sine": (
