@@ -20,8 +20,10 @@ class Material(NamedTuple):
         damping_rotation: to ground, per unit, tonne mm^2/s.
         end_angles: (n_ligaments, 2) at which a ligament, straight by itself, is held at its first
             and its second end, against its vector, counter-clockwise, rad; it is bent where they
-            are not zero.
-        elongation: by which a ligament is longer by itself than its vector, mm.
+            are not zero. A motion begins with all units where the lattice has them, and with that
+            stress in the ligaments, as if they were let go there: `sim.scene.relaxed` counts it
+            from where the structure lies at rest, as a specimen does.
+        elongation: by which a ligament is longer by itself than its vector, mm; as `end_angles`.
     """
 
     density: float | Numbers
