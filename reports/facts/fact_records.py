@@ -104,8 +104,17 @@ def within(value: float, unit: str, digits: int) -> str:
 
 
 def worded(value: float, unit: str, digits: int) -> str:
-    """Returns number and unit as they are printed; tiny rounding leftovers are zero."""
-    return printed("0" if abs(value) < 1e-9 else f"{value:.{digits}g}", unit)
+    """Returns number and unit as they are printed."""
+    return printed(significant(value, unit, digits), unit)
+
+
+def significant(value: float, unit: str, digits: int) -> str:
+    """Writes a number of a unit without it; tiny rounding leftovers are zero.
+
+    Energies grow with the square of a load, so that soft structures have true ones as small.
+    """
+    rounding = 1e-18 if unit == "N mm" else 1e-9
+    return "0" if abs(value) < rounding else f"{value:.{digits}g}"
 
 
 def printed(text: str, unit: str) -> str:

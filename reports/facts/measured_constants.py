@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem import Problem
-from reports.facts.fact_records import Fact, facts_of, percent, worded
+from reports.facts.fact_records import Fact, facts_of, percent, printed, significant, worded
 from reports.study import display_name
 from sim.core import Floats
 
@@ -44,5 +44,5 @@ def constants_facts(
 
 def _quantity(values: Floats, unit: str) -> str:
     low, high = np.quantile(values, _ENDS)
-    ends = f"{worded(float(low), '1', 3)} to {worded(float(high), '1', 3)}"
-    return f"{worded(float(values.mean()), unit, 3)} ({ends})"
+    ends = (printed(significant(float(end), unit, 3), "1") for end in (low, high))
+    return f"{worded(float(values.mean()), unit, 3)} ({' to '.join(ends)})"

@@ -65,6 +65,10 @@ def test_wording_of_numbers() -> None:
     assert fact_records.worded(-0.25, "mm", 3) == "−0.25 mm"
     assert fact_records.worded(1.234e-7, "1", 2) == "1.2 × 10⁻⁷"
     assert fact_records.worded(1e-12, "mm", 3) == "0 mm"
+    assert (
+        fact_records.worded(2.5e-11, "N mm", 3) == "2.5 × 10⁻¹¹ N mm"
+    )  # of a thousandth of a load
+    assert fact_records.worded(1e-20, "N mm", 3) == "0 N mm"
     assert fact_records.within(1e-12, "mm", 2) == "below 1 × 10⁻⁹ mm"
     assert fact_records.within(0.012, "mm", 2) == "0.012 mm"
     assert fact_records.percent(0.8512) == "85.1 %"
