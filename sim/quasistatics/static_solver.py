@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,7 +11,13 @@ from sim.collision import new_pairs, raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
 from sim.energy import System, Topology, as_values, empty_bars, system_of, workspace
 from sim.quasistatics.equilibrium_path import MOST_SNAPS, Branch, adjoint, follow
-from sim.solvers import PrescribedMotion, check_connected, check_ligaments, check_start
+from sim.solvers import (
+    PrescribedMotion,
+    check_connected,
+    check_ligaments,
+    check_start,
+    missed_peaks,
+)
 from sim.structure import ConcreteParameters
 
 ROUNDING, ROUNDING_OF_MOTION = 4e-14, 1e-15
@@ -75,7 +82,8 @@ class StaticSolver:
     ) -> tuple[Floats, Floats, StaticRecord]:
         """See ``Solver``."""
         check_connected(self.topology)
-        loads = drive.values(self.topology.held, self.passed)
+        passed, last = self._way(drive)
+        loads = drive.values(self.topology.held, passed)
         branch = _empty_branch(len(loads), self.topology.n_dofs)
         counts, progress = np.zeros(4, dtype=np.int64), np.zeros(4)
         top = self.topology
@@ -92,10 +100,10 @@ class StaticSolver:
         raise_new_pairs(system.contacts)
         if reached < len(loads):
             if self.leaves or not branch.jumped[reached]:
-                raise self._ended(values, branch.states[: reached + 1], fraction)
+                raise self._ended(values, branch.states[: reached + 1], fraction, last)
             branch.states[reached:] = np.nan
         check_ligaments(top, values, branch.states[:reached])
-        record = self._record(branch, counts, top)
+        record = _record(branch, counts, top, passed, last)
         return record.states.copy(), np.zeros_like(record.states), record
 
     def _follow(
@@ -115,47 +123,45 @@ class StaticSolver:
         )  # fmt: skip
 
     def _ended(
-        self, values: ConcreteParameters, states: Floats, fraction: float
+        self, values: ConcreteParameters, states: Floats, fraction: float, last: Ints
     ) -> SimulationError:
-        """Explains that no equilibrium was found beyond the last of the states."""
-        top, reached = self.topology, len(states) - 1
+        """Explains that no equilibrium was found beyond the last of the states.
+
+        Of the loads, those numbered in `last` (n_times,) are output.
+        """
+        top, output = self.topology, last[last < len(states) - 1]
         where = top.smallest_void_angles(values.void, states[-1].reshape(-1, 3)).argmin()
         unit = int(top.ligament_units[where, 0])
         return SimulationError(
-            f"no equilibrium found beyond load {reached // self.substeps} of"
+            f"no equilibrium found beyond load {len(output)} of"
             f" {len(self.output_times)} (at {fraction:.3g} of"
             f" the way to the next; the narrowest void is at unit {unit}): jammed contact or no"
             " stable state; try a smaller load or more load steps",
-            step=reached // self.substeps,
+            step=len(output),
             unit=unit,
-            states=states[:-1][self.substeps - 1 :: self.substeps],
-        )
-
-    def _record(self, branch: Branch, counts: Ints, topology: Topology) -> StaticRecord:
-        """Keeps the output loads of all that were passed."""
-        last = slice(self.substeps - 1, None, self.substeps)
-        before = np.concatenate([[0.0], self.passed[:-1]])
-        snapped = (before + branch.snapped * (self.passed - before)).reshape(-1, self.substeps)
-        places = branch.snaps[np.isfinite(branch.snaps)]
-        ways = np.minimum(places.astype(np.int64), len(before) - 1)
-        return StaticRecord(
-            branch.states[last].copy(),
-            branch.tangents[last].copy(),
-            branch.stable[last].copy(),
-            _first_kinds(branch.jumped.reshape(-1, self.substeps)),
-            np.fmax.reduce(snapped, axis=1),
-            branch.eigenvalue[last].copy(),
-            counts,
-            topology,
-            before[ways] + (places - ways) * (self.passed - before)[ways],
+            states=states[output],
         )
 
     @property
     def passed(self) -> Floats:
-        """Lists the load parameters (n_times * substeps,) of all loads; the path starts at zero."""
+        """Lists the load parameters (n_times * substeps,) of loads; the path starts at zero."""
         way = np.diff(self.output_times, prepend=0.0)
         left = np.arange(self.substeps - 1, -1, -1) / self.substeps
         return (self.output_times[:, None] - way[:, None] * left).ravel()
+
+    def _way(self, drive: PrescribedMotion) -> tuple[Floats, Ints]:
+        """Lists the load parameters of all loads, and the numbers (n_times,) of the output ones.
+
+        What a structure does there depends on how far it was moved before: the peaks of a series
+        between two output loads are passed as well.
+        """
+        stops: list[float] = []
+        last = []
+        for start, end in pairwise([0.0, *self.output_times.tolist()]):
+            peaks = missed_peaks(drive.motion, start, end)
+            stops += [*(peaks if end > start else peaks[::-1]).tolist(), end]
+            last.append(len(stops) * self.substeps - 1)
+        return replace(self, output_times=np.array(stops)).passed, np.array(last, dtype=np.int64)
 
     def _known(self, states: Floats) -> tuple[Floats, Ints]:
         """Computes the departure of the start's path from its tangents, and where it may serve."""
@@ -201,6 +207,28 @@ def _forget(branch: Branch, known: int) -> None:
     branch.snaps[branch.snaps >= known] = np.nan
 
 
-def _first_kinds(jumped: Ints) -> Ints:
-    """Takes from rows (n_times, substeps) the first kind that is no smooth way, or 0."""
-    return jumped[np.arange(len(jumped)), (jumped > 0).argmax(axis=1)]
+def _record(
+    branch: Branch, counts: Ints, topology: Topology, passed: Floats, last: Ints
+) -> StaticRecord:
+    """Keeps the output loads, numbered in `last` (n_times,), of all that were passed."""
+    before, first = np.concatenate([[0.0], passed[:-1]]), np.append(0, last[:-1] + 1)
+    snapped = before + branch.snapped * (passed - before)
+    places = branch.snaps[np.isfinite(branch.snaps)]
+    ways = np.minimum(places.astype(np.int64), len(before) - 1)
+    return StaticRecord(
+        branch.states[last].copy(),
+        branch.tangents[last].copy(),
+        branch.stable[last].copy(),
+        _first_kinds(branch.jumped, last),
+        np.fmax.reduceat(snapped, first),
+        branch.eigenvalue[last].copy(),
+        counts,
+        topology,
+        before[ways] + (places - ways) * (passed - before)[ways],
+    )
+
+
+def _first_kinds(jumped: Ints, last: Ints) -> Ints:
+    """Takes of the loads up to each output one the first kind that is no smooth way, or 0."""
+    ways = np.split(jumped, last[:-1] + 1)
+    return np.array([way[(way > 0).argmax()] for way in ways], dtype=np.int64)

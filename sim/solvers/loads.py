@@ -138,6 +138,8 @@ class Together(NamedTuple):
 class TimeSeries(NamedTuple):
     """Follows a measured motion, interpolated linearly.
 
+    A path of equilibria passes its peaks, though they lie between output loads.
+
     Attributes:
         times: (n,) s, ascending.
         motion: (n, 3) mm, mm, rad; or (n, n_units, 3) with one motion for each driven unit.
@@ -183,6 +185,31 @@ def _kinks(times: Floats, motion: Floats) -> Floats:
     noticed = np.ones(len(times), dtype=bool)
     noticed[1:-1] = (off > NOTICED * np.ptp(flat, axis=0)).any(axis=1)
     return np.asarray(times[noticed])
+
+
+def missed_peaks(motion: MotionLaw, start: float, end: float) -> Floats:
+    """Finds times (n,) between two others at which a series is beyond what it is at both, s.
+
+    They are those of the largest and the smallest value of each component, ascending; one that
+    exceeds both ends by less than is noticed is left out.
+    """
+    series = (one for one in single_motions(motion) if isinstance(one, TimeSeries))
+    found = [_peaks(one, min(start, end), max(start, end)) for one in series]
+    return np.unique(np.concatenate([np.zeros(0), *found]))
+
+
+def _peaks(series: TimeSeries, start: float, end: float) -> Floats:
+    times = np.asarray(series.times, dtype=float)
+    between = np.flatnonzero((times > start) & (times < end))
+    if not len(between):
+        return np.zeros(0)
+    flat = np.asarray(series.motion, dtype=float).reshape(len(times), -1)
+    ends = np.stack([np.interp([start, end], times, column) for column in flat.T], axis=1)
+    noticed, found = NOTICED * np.ptp(flat, axis=0), flat[between]
+    above = found.max(axis=0) > ends.max(axis=0) + noticed
+    below = found.min(axis=0) < ends.min(axis=0) - noticed
+    places = np.append(found.argmax(axis=0)[above], found.argmin(axis=0)[below])
+    return np.asarray(times[between[places]])
 
 
 def single_motions(motion: MotionLaw) -> tuple[MotionLaw, ...]:

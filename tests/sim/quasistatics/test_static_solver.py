@@ -8,7 +8,7 @@ from sim.core import Floats, Ints
 from sim.energy import gradient, system_of, workspace
 from sim.linalg import Storage
 from sim.quasistatics import BRANCHING, StaticSolver
-from sim.solvers import LinearRamp, MotionLaw, TimeSeries, solve_case
+from sim.solvers import DISPLACEMENT, FORCE, FREE, LinearRamp, MotionLaw, TimeSeries, solve_case
 from sim.structure import quads
 from tests.sim.structures import LEFT, NONE, Rig, mixed_polygons, rotating_squares, squeezed
 
@@ -155,6 +155,22 @@ def test_more_loads_on_the_way_change_nothing() -> None:
         np.testing.assert_allclose(
             finer.forward(rig.values, rig.drive)[0], states, rtol=0, atol=1e-8
         )
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_the_peak_of_a_cycle_between_output_loads_is_passed(substeps: int) -> None:
+    """A chain is pushed to one side as it buckles, to the other one later, and is let go there."""
+    times, motion = np.array([0.0, 0.5, 1.0, 2.0, 3.0]), np.zeros((5, 2, 3))
+    motion[:, 0, 0], motion[:, 1, 1] = [0.0, -3.0, -6.0, -6.0, -6.0], [0.0, 1.0, 0.0, -1.0, 0.0]
+    control = np.array([[DISPLACEMENT] * 3, [FREE, FORCE, FREE]])
+    rig = replace(chain(TimeSeries(times, motion), np.array([8, 4])), control=control)
+    solver = StaticSolver(rig.topology, np.array([1.0, 3.0]), substeps=substeps)
+    found = solver.forward(rig.values, rig.drive)[2]
+    middle = found.states.reshape(2, -1, 3)[:, 4, 1]
+    assert middle[0] > 5.0
+    assert middle[1] == pytest.approx(-middle[0])
+    assert found.jumped[1]
+    assert 2.0 > found.snapped[1] > 1.0
 
 
 def test_a_path_known_from_a_similar_structure_saves_work_and_changes_nothing() -> None:
