@@ -1,12 +1,12 @@
 """Reads the brightness of pictures, of whatever depth, and writes drawings over them."""
 
-import struct
-import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
+from PIL.Image import fromarray
+from PIL.PngImagePlugin import PngInfo
 
 from pipeline.runtime import Picture, UserError, begins_with, write_atomically
 from sim.core import Image
@@ -21,10 +21,10 @@ _SPILT = 2.0
 
 _AS_THEY_ARE = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH
 
-_DRAWN = "Software\0metacloak: python -m pipeline track"
-"""Keyword and text of a chunk, by which drawings are known."""
-_PNG_HEAD = 33  # bytes of a PNG's signature and first chunk
-is_own_drawing = begins_with(_DRAWN)
+_KEYWORD, _DRAWN = "Software", "metacloak: python -m pipeline track"
+"""Of a chunk of text, by which drawings are known."""
+_QUICK = 1  # of 9: a third of the time, and a third more bytes
+is_own_drawing = begins_with(f"{_KEYWORD}\0{_DRAWN}")
 
 
 def read_levels(path: Path) -> np.ndarray | None:
@@ -97,8 +97,8 @@ def write_drawing(picture: np.ndarray, path: Path) -> None:
 
     `is_own_drawing` knows it by that.
     """
-    encoded = cv2.imencode(".png", picture)[1].tobytes()
-    text = b"tEXt" + _DRAWN.encode()
-    chunk = struct.pack(">I", len(text) - 4) + text + struct.pack(">I", zlib.crc32(text))
+    told = PngInfo()
+    told.add_text(_KEYWORD, _DRAWN)
+    drawn = fromarray(np.ascontiguousarray(picture[..., ::-1]))
     with write_atomically(path) as aside:
-        aside.write_bytes(encoded[:_PNG_HEAD] + chunk + encoded[_PNG_HEAD:])
+        drawn.save(aside, "PNG", pnginfo=told, compress_level=_QUICK)
