@@ -26,6 +26,7 @@ THIN_WALL = 0.9
 STRAIGHT = 1e-4
 """Strain below which a shim counts as straight."""
 
+_STRAIN_DIGITS = 9
 SHIM_PLAY = 0.1
 """Most that a shim may be shorter than from slot end to slot end, mm."""
 
@@ -271,9 +272,12 @@ class BuiltSpecimen:
 
     @property
     def bent(self) -> list[Ligament]:
-        """Ligaments whose shims are bent before any load, the most strained first."""
+        """Ligaments whose shims are bent before any load, the most strained first.
+
+        Mirrored ones are strained alike but for rounding, which is not to order them.
+        """
         bent = [ligament for ligament in self.ligaments if ligament.strain > STRAIGHT]
-        return sorted(bent, key=lambda ligament: (-ligament.strain, ligament.number))
+        return sorted(bent, key=lambda one: (-round(one.strain, _STRAIN_DIGITS), one.number))
 
     @property
     def thin(self) -> dict[str, float]:

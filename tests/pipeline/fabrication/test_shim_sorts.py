@@ -54,3 +54,12 @@ def test_a_length_that_is_read_upside_down_is_none() -> None:
     written = [marks(piece) for piece in pieces]
     assert all(written)
     assert not any(marks(piece, -1.0) in written for piece in pieces)
+
+
+def test_mirrored_shims_are_listed_by_their_numbers() -> None:
+    """Strains that differ by rounding alone tell no order."""
+    whole = handmade.specimen()
+    strains = {0: 0.02, 1: 0.1, 2: 0.1 + 3e-16, 3: 0.1 + 1e-13, 4: 0.1001}
+    bent = [replace(one, strain=strains.get(one.number, 0.0)) for one in reversed(whole.ligaments)]
+    found = replace(whole, ligaments=tuple(bent)).bent
+    assert [one.number for one in found] == [4, 1, 2, 3, 0]
