@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
 import shapely
 from shapely import Polygon
 
@@ -65,6 +66,8 @@ def compensated(part: FlatPart, kerf: float, file: str) -> FlatPart:
         what = f"a kerf of {kerf:g} mm closes {closed} of part {part.id}"
         remedy = "lower it, or raise fabrication.slots.clearance and those of fabrication.coupon"
         remedy += "; with a smaller fabrication.laser.aspect_ratio units are printed only"
+        if np.isinf(part.slot):  # a template's holes, a comb's teeth
+            remedy = "lower it, or ask for larger dots (fabrication.markers.diameter)"
         raise UserError(what, file=file, key="fabrication.laser.kerf", remedy=remedy)
     outline = shapely.orient_polygons(grown.simplify(_SHORT))
     holes = tuple(Circle(hole.centre, hole.diameter - kerf) for hole in part.holes)
