@@ -195,7 +195,7 @@ def missed_peaks(motion: MotionLaw, start: float, end: float) -> Floats:
     """
     series = (one for one in single_motions(motion) if isinstance(one, TimeSeries))
     found = [_peaks(one, min(start, end), max(start, end)) for one in series]
-    return np.unique(np.concatenate([np.zeros(0), *found]))
+    return np.unique(np.concatenate(found)) if found else np.zeros(0)
 
 
 def _peaks(series: TimeSeries, start: float, end: float) -> Floats:
