@@ -49,6 +49,26 @@ def test_units_that_are_cut_out_are_not_drawn(browser: Chrome) -> None:
     assert colours[1][3] == 0
 
 
+def test_pads_that_overlap_are_joined(browse: Open, page: Path, tmp_path: Path) -> None:
+    """Those of the units of a kagome lattice do: strokes of one crossed the next."""
+    text = page.read_text(encoding="utf-8")
+    assert '"pad": 15.0' in text
+    wide = tmp_path / "wide.html"
+    wide.write_text(text.replace('"pad": 15.0', '"pad": 20.0'), encoding="utf-8")
+    colours = browse(wide, 1100, 800, 2.0).execute_script(
+        """
+        const canvas = document.querySelector("#player .stage canvas");
+        const pen = canvas.getContext("2d");
+        const pixel = (y) => {
+          const at = pen.getTransform().transformPoint(new DOMPoint(-8.5, y));
+          return [...pen.getImageData(Math.round(at.x), Math.round(at.y), 1, 1).data].join();
+        };
+        return [...Array(200).keys()].map((k) => pixel(0.3 * k));
+        """
+    )
+    assert set(colours) == {"212,215,219,255"}
+
+
 def test_colours_begin_with_that_of_the_figure(browser: Chrome) -> None:
     menu = Select(browser.find_element(By.ID, "player-field"))
     assert [option.text for option in menu.options] == [

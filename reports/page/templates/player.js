@@ -172,15 +172,17 @@
     return out;
   };
 
+  // As one shape: pads of a kagome lattice overlap, and the strokes of one would cross the next.
   const drawClamps = (pen, structure, pad) => {
-    pen.strokeStyle = "#1a1a1a";
-    pen.fillStyle = "#d4d7db";
+    pen.beginPath();
     for (const unit of structure.clamped) {
-      const x = structure.centroid[2 * unit] - pad / 2;
-      const y = structure.centroid[2 * unit + 1] - pad / 2;
-      pen.fillRect(x, y, pad, pad);
-      pen.strokeRect(x, y, pad, pad);
+      pen.rect(structure.centroid[2 * unit] - pad / 2, structure.centroid[2 * unit + 1] - pad / 2,
+        pad, pad);
     }
+    pen.strokeStyle = "#1a1a1a";
+    pen.stroke();
+    pen.fillStyle = "#d4d7db";
+    pen.fill();
   };
 
   const drawUnits = (pen, structure, points, shown) => {
@@ -231,8 +233,9 @@
     pen.clearRect(0, 0, canvas.width, canvas.height);
     pen.setTransform(scale, 0, 0, -scale, -extent.x * scale, extent.y * scale);
     pen.lineJoin = "round";
-    pen.lineWidth = 0.7 * pixel;
+    pen.lineWidth = 1.4 * pixel; // of which the pads cover half
     drawClamps(pen, structure, data.pad);
+    pen.lineWidth = 0.7 * pixel;
     pen.strokeStyle = "#6b6f75";
     pen.beginPath();
     for (let k = 0; k < structure.ligaments.length; k += 2) {
