@@ -53,7 +53,7 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
     legend = LoadLegend.of(study)
     grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS - legend.height)
     top = 52.0
-    low = top + grid.head + grid.lines * grid.height + 2.0
+    low = top + grid.head + grid.total + 2.0
     colours = shade_of(problem, study.response).field.label.replace("u_y", "u<sub>y</sub>")
     clamped = _PROSE["rest"].format(
         turns=arrows_in_words(study),
@@ -69,7 +69,7 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
         ),
         *_side_by_side(list(_curves(study, path, legend)), low, legend),
     ]
-    remark = measured_overlay.caption(study.recordings, grid.recorded)
+    remark = measured_overlay.caption(study.recordings, grid.recorded) + grid.omission(path)
     return PanelFigure(low + 48.0 + legend.height, panels, study.draft, remark)
 
 

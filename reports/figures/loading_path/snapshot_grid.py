@@ -37,6 +37,10 @@ _NEARLY_SQUARE = 0.8
 
 _HEAD, _LINE = 8.5, 3.0
 """Room above snapshots whose labels are of one line, and for each other one, mm."""
+_BAND_HEAD = 4.0
+"""The same above those that are wrapped, with no title of the panel there, mm."""
+_NARROWEST = 12.0
+"""Width below which structures side by side are wrapped, mm."""
 
 _GAPS = re.compile(r" (?![^(]*\))")
 """Spaces outside of brackets."""
@@ -83,48 +87,90 @@ def rows(study: StudyResults) -> list[SnapshotStructure]:
 
 @dataclass(frozen=True)
 class SnapshotLayout:
-    """Tells how the snapshots are laid out: structures above one another or side by side; mm."""
+    """Tells how the snapshots are laid out: structures above one another or side by side; mm.
+
+    Many side by side are wrapped into `bands`.
+    """
 
     rows: list[SnapshotStructure]
     path: Abscissa
     width: float
     height: float
     beside: bool
+    bands: int = 1
 
     @classmethod
     def of(cls, study: StudyResults, path: Abscissa, tallest: float) -> "SnapshotLayout":
         """Returns the layout that shows them larger.
 
-        They are at most `tallest` (mm) together with all lines of their labels but the first.
+        They are at most `tallest` (mm) together with all lines of their labels but the first. Where
+        that has no room for the labels, structures side by side are wrapped; where that does not do
+        either, only the first and the last of the loads are shown, or the last alone.
         """
-        kinds, loads = rows(study), len(path.shown)
-        across = style.TWO_COLUMNS - LABEL - BAR
+        kinds, slim = rows(study), _slenderness(study.problem.lattice)
+        plain = cls._one_band(kinds, path, tallest, slim)
+        if not plain.cramped:
+            return plain
+        found = plain
+        for shown in dict.fromkeys((path.shown, (path.shown[0], path.shown[-1]), path.shown[-1:])):
+            some = replace(path, shown=shown)
+            found = cls._wrapped_bands(kinds, some, tallest, slim)
+            if not found.cramped:
+                break
+        return found
 
-        slim = _slenderness(study.problem.lattice)
-        largest = LARGEST * min(1.0, 1.0 / slim)
-
-        def width(columns: int, lines: int) -> float:
-            return min(across / columns, tallest / lines / slim, largest)
-
-        above, beside = width(loads, len(kinds)), width(len(kinds), loads)
+    @classmethod
+    def _one_band(
+        cls, kinds: list[SnapshotStructure], path: Abscissa, tallest: float, slim: float
+    ) -> "SnapshotLayout":
+        loads = len(path.shown)
+        above = _width(loads, len(kinds), tallest, slim)
+        beside = _width(len(kinds), loads, tallest, slim)
         most = max(above, beside)
-        made = cls(kinds, path, most, slim * most, beside > above)
-        room = (tallest - (made.head - _HEAD)) / made.lines
-        return made if made.height <= room else replace(made, width=room / slim, height=room)
+        return cls(kinds, path, most, slim * most, beside > above)._fitted(tallest, slim)
+
+    @classmethod
+    def _wrapped_bands(
+        cls, kinds: list[SnapshotStructure], path: Abscissa, tallest: float, slim: float
+    ) -> "SnapshotLayout":
+        """Returns the layout of structures side by side in as many bands as show them largest."""
+        found = []
+        for bands in range(1, len(kinds) + 1):
+            wide = _width(-(-len(kinds) // bands), bands * len(path.shown), tallest, slim)
+            made = cls(kinds, path, wide, slim * wide, True, bands)
+            found.append(made._fitted(tallest, slim)._fitted(tallest, slim))  # of narrower labels
+        return max(found, key=lambda made: made.width)
+
+    @property
+    def cramped(self) -> bool:
+        """Tests if structures side by side are narrow, or a word of a label runs into the next."""
+        room = (self.width if self.beside else self.height) - GAP
+        kinds = self.labels[0 if self.beside else 1]
+        lines = [line for text, _ in kinds for line in text.split("\n")]
+        narrow = self.beside and self.width < _NARROWEST
+        return narrow or max(_length(line, style.SMALL) for line in lines) > room
+
+    def _fitted(self, tallest: float, slim: float) -> "SnapshotLayout":
+        """Returns the layout with snapshots no taller than there is room for."""
+        room = (tallest - (self.head - _HEAD) - self._heads_until(self.bands - 1)) / self.lines
+        room = max(room, 1.0)
+        return self if self.height <= room else replace(self, width=room / slim, height=room)
 
     @property
     def lines(self) -> int:
         """Returns number of snapshots above one another."""
-        return len(self.path.shown) if self.beside else len(self.rows)
+        return self.bands * len(self.path.shown) if self.beside else len(self.rows)
 
     @property
     def columns(self) -> int:
         """Returns number of snapshots side by side."""
-        return len(self.rows) if self.beside else len(self.path.shown)
+        return -(-len(self.rows) // self.bands) if self.beside else len(self.path.shown)
 
     @property
     def recorded(self) -> str:
         """Tells where a recording is, seen from its simulation."""
+        if self.bands > 1:
+            return "before"
         return "left of" if self.beside else "above"
 
     @property
@@ -146,11 +192,47 @@ class SnapshotLayout:
     @property
     def head(self) -> float:
         """Returns the room for the panel's title and the labels above the snapshots."""
-        return _HEAD + _LINE * max(text.count("\n") for text, _ in self.labels[0])
+        return _HEAD + self._further_lines(0)
+
+    @property
+    def total(self) -> float:
+        """Returns the room for all snapshots below the head."""
+        return self.lines * self.height + self._heads_until(self.bands - 1)
+
+    def _heads_until(self, band: int) -> float:
+        """Returns the room for the labels of all bands from the second to this one."""
+        return sum(_BAND_HEAD + self._further_lines(k) for k in range(1, band + 1))
+
+    def _further_lines(self, band: int) -> float:
+        """Returns the room for all lines but one of the labels above a band."""
+        above = self.labels[0][band * self.columns : (band + 1) * self.columns]
+        return _LINE * max((text.count("\n") for text, _ in above), default=0)
 
     def at(self, row: int, load: int) -> tuple[int, int]:
         """Returns line and column of a snapshot."""
-        return (load, row) if self.beside else (row, load)
+        band, column = divmod(row, self.columns)
+        return (band * len(self.path.shown) + load, column) if self.beside else (row, load)
+
+    def below(self, line: int) -> float:
+        """Returns how far below the first line of snapshots another one begins, mm."""
+        return line * self.height + self.heads(line)
+
+    def heads(self, line: int) -> float:
+        """Returns the room for the labels of bands between the first line and another one, mm."""
+        return self._heads_until(line // (self.lines // self.bands))
+
+    def omission(self, path: Abscissa) -> str:
+        """Tells that not all samples of the path are shown that were to be, as HTML."""
+        if self.path.shown == path.shown:
+            return ""
+        which = "last alone is" if len(self.path.shown) == 1 else "first and the last are"
+        return f" Of the {len(path.shown)} instants of the snapshots the {which} shown, for room."
+
+
+def _width(columns: int, lines: int, tallest: float, slim: float) -> float:
+    """Returns the width of a snapshot, mm, so that so many fit beside and above one another."""
+    across = style.TWO_COLUMNS - LABEL - BAR
+    return min(across / columns, tallest / lines / slim, LARGEST * min(1.0, 1.0 / slim))
 
 
 def _slenderness(lattice: Lattice) -> float:
@@ -206,28 +288,30 @@ def snapshots(
     for k, row in enumerate(grid.rows):
         for m, sample in enumerate(grid.path.shown):
             line, column = grid.at(k, m)
-            axes = style.place(
-                figure, grid.left + column * wide, top + line * tall, wide - GAP, tall - GAP
-            )
+            left, below = grid.left + column * wide, grid.below(line)
+            axes = style.place(figure, left, top + below, wide - GAP, tall - GAP)
             snapshot(axes, study.problem, row.part, sample, shade, row.case, margin)
             if overlay is not None:
                 overlay(axes, row, sample)
     _labels(figure, grid, top, *grid.labels)
     end = grid.left + grid.columns * wide
-    shade_bar(figure, shade, (end + 1.5, top, grid.lines * tall - GAP))
+    shade_bar(figure, shade, (end + 1.5, top, grid.total - GAP))
 
 
 def _labels(
     figure: Figure, grid: SnapshotLayout, top: float, above: Sequence[Label], left: Sequence[Label]
 ) -> None:
     for k, (text, colour) in enumerate(above):
-        x = grid.left + (k + 0.5) * grid.width - GAP / 2
+        band, column = divmod(k, grid.columns)
+        x = grid.left + (column + 0.5) * grid.width - GAP / 2
+        y = top + grid.below(band * (grid.lines // grid.bands)) - 0.8
         style.write(
-            figure, x, top - 0.8, text, ha="center", va="bottom", color=colour,
+            figure, x, y, text, ha="center", va="bottom", color=colour,
             fontsize=_size(text, grid.width - GAP), multialignment="center",
         )  # fmt: skip
-    for k, (text, colour) in enumerate(left):
-        y = top + (k + 0.5) * grid.height - GAP / 2
+    for k in range(grid.lines):
+        text, colour = left[k % len(left)]
+        y = top + (k + 0.5) * grid.height + grid.heads(k) - GAP / 2
         off = 0.5 if "\n" in text else 1.5
         size = _size(text, grid.height - GAP)
         style.write_upwards(figure, grid.left - off, y, text, color=colour, fontsize=size)

@@ -46,7 +46,7 @@ def wave_figure(study: StudyResults) -> PanelFigure:
     legend = LoadLegend.of(study)
     grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS - legend.height)
     top = 52.0
-    middle = top + grid.head + grid.lines * grid.height + 1.5
+    middle = top + grid.head + grid.total + 1.5
     first = middle + ROOM + legend.height
     low = middle + 44.0 + legend.height
 
@@ -86,7 +86,7 @@ def wave_figure(study: StudyResults) -> PanelFigure:
             _steps(study.verification),
         ),
     ]
-    remark = measured_overlay.caption(study.recordings, grid.recorded)
+    remark = measured_overlay.caption(study.recordings, grid.recorded) + grid.omission(path)
     return PanelFigure(low + 46.0, panels, study.draft, remark)
 
 

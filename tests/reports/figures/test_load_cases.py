@@ -116,6 +116,28 @@ def test_snapshots_of_many_recordings_are_told_apart(two: StudyResults, tmp_path
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
 
 
+@pytest.mark.parametrize("filmed", [(), ("cloaked",), ("altered", "cloaked")])
+def test_snapshots_of_many_loads_are_wrapped(
+    two: StudyResults, tmp_path: Path, filmed: tuple[str, ...]
+) -> None:
+    """In a single row those of four loads, and as many recordings, were as wide as a letter."""
+    many = in_many(two, 4)
+    shown = [(name, case) for name in filmed for case in range(4)]
+    study = recorded_study.with_recordings(many, tmp_path, *shown)
+    path = abscissa.abscissa_of(study.problem, study.response)
+    grid = snapshot_grid.SnapshotLayout.of(study, path, figure.TALLEST_SNAPSHOTS - 10.0)
+    assert min(grid.width, grid.height) >= 12.0
+    places = {grid.at(k, m) for k in range(len(grid.rows)) for m in range(len(grid.path.shown))}
+    assert len(places) == len(grid.rows) * len(grid.path.shown)
+    assert grid.head - 8.5 + grid.total <= figure.TALLEST_SNAPSHOTS - 10.0 + 1e-9
+    with style.styled():
+        made = figure.loading_path_figure(study)
+        figure_assertions.assert_legible(figure_assertions.drawn(made.draw()))
+    left_out = len(grid.path.shown) < len(path.shown)
+    assert ("instants of the snapshots" in made.caption) == left_out
+    assert grid.path.shown[-1] == path.shown[-1]
+
+
 def test_snapshots_hold_a_structure_that_is_pulled(smile: StudyResults) -> None:
     """Those of one that is pressed have the scale that they had."""
     pulled = smile.response.assign(displacement=-smile.response["displacement"])
