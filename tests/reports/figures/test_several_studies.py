@@ -3,9 +3,12 @@ import dataclasses
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray as xr
 
 from pipeline import problem
+from pipeline.problem import Output
 from pipeline.problem.reading import JointFigure, joint_figure
 from pipeline.runtime import UserError
 from reports.__main__ import main
@@ -45,6 +48,38 @@ def test_it_is_legible_with_any_number_of_studies(pair: list[StudyResults], coun
     words = figure_assertions.words(made)
     assert {"Intact", "Voided", "Cloaked", "Smile"} <= words
     assert set("abcdefghijkl"[: -(-count // 2) + 3 * count]) <= words
+
+
+@pytest.mark.parametrize(("count", "loads", "told"), [(2, 2, 2), (2, 4, 4), (4, 4, 1)])
+def test_structures_are_shown_under_every_load_or_the_one_shown_is_told(
+    smile: StudyResults, count: int, loads: int, told: int
+) -> None:
+    study = under_loads(smile, loads)
+    with style.styled():
+        made = figure.several_studies_figure([study] * count)
+        page = figure_assertions.drawn(made.draw())
+    figure_assertions.assert_legible(page)
+    words = "\n".join(text.get_text() for text in page.texts)
+    names = ["compression 180°", "extension 0°", "shear 90°", "shear 270°"][:loads]
+    assert [name for name in names if name in words] == names[:told]
+    assert ("Of the load cases the first one, compression 180°" in made.caption) == (told < loads)
+    (legend,) = page.legends
+    entries = {text.get_text() for text in legend.get_texts()}
+    assert {f"Cloaked, {name}" for name in names} <= entries
+
+
+def under_loads(study: StudyResults, count: int) -> StudyResults:
+    """The study with its one load case as that of several directions."""
+    degrees = [180.0, 0.0, 90.0, 270.0][:count]
+    response = xr.concat([study.response] * count, "case", data_vars="minimal", coords="minimal")
+    response = response.assign_coords(direction=("case", degrees))
+    drive = study.problem.drive.model_copy(
+        update={"directions": tuple(np.radians(degrees)), "weights": None}
+    )
+    posed = study.problem.model_copy(update={"drive": drive})
+    made = response.assign_attrs(study.response.attrs)
+    datasets: dict[Output, xr.Dataset] = {"design": study.design, "response": made}
+    return dataclasses.replace(study, problem=posed, datasets=datasets)
 
 
 def test_the_page_tells_each_study_and_shows_each_structure_once(report: Path) -> None:
