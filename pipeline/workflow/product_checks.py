@@ -59,13 +59,30 @@ def check_products(words: Collection[str]) -> None:
     """Refuses targets of products, among the words of a command, that nothing would be shown by.
 
     Raises:
-        UserError: a study does not ask for the product; names file, key and remedy.
+        UserError: a study does not ask for the product, or its several designs have no page; names
+            file, key and remedy.
     """
     built = targets()
     for word in words:
+        page = word.removeprefix("results/").removesuffix("/report/index.html")
+        if page in built:
+            _check_page(Study.parse(built[page]))
         for end in PRODUCTS:
             if word.endswith(end) and word.removesuffix(end) in built:
                 _check_product(built[word.removesuffix(end)], end)
+
+
+def _check_page(study: Study) -> None:
+    """Refuses the page of several designs of a drive that is not harmonic: there is none."""
+    designs = families().get(study, [])
+    kinds = {str(problem_of(each).drive.kind) for each in designs}
+    if others := kinds - {"harmonic", "ramp_harmonic"}:
+        named = ", ".join(map(str, designs))
+        remedy = f"build {named}, which have a page each"
+        what = "the page of several designs is of harmonic drives"
+        raise UserError(
+            what, file=study.problem, key="drive.kind", value=min(others), remedy=remedy
+        )
 
 
 def _check_product(built: str, end: str) -> None:

@@ -82,8 +82,8 @@ def _unread(asked: Problem) -> Iterator[str]:
     if asked.designs is not None and not isinstance(asked.drive, HarmonicDrive | RampHarmonicDrive):
         yield (
             "the page of several `designs` is of harmonic drives, not of"
-            f" `{asked.drive.kind}`: they are designed and simulated, but their page is not drawn;"
-            " give them as presets for a page each"
+            f" `{asked.drive.kind}`: build each by its number for a page of its own, such as"
+            " NAME@1"
         )
     if asked.report.places and kinds.kind_of(asked) is not kinds.WAVE:
         yield (
