@@ -1,6 +1,8 @@
 """Reads frames of a folder of numbered pictures (PNG, TIFF)."""
 
 import re
+import shlex
+import sys
 from collections.abc import Iterator
 from itertools import takewhile
 from pathlib import Path
@@ -112,6 +114,16 @@ def images(found: list[Path]) -> Iterator[Picture]:
             raise UserError("not a readable picture", file=path, remedy="write the file again")
         if path.suffix.lower() in _PAGED and (count := page_count(path)) > 1:
             what = f"there are {count} pictures in one file"
-            remedy = f"write each to a file, e.g. magick {path.name} {path.stem}_%05d.tif"
+            remedy = f"write each to a file and take {path.name} away: {_split_pages(path)}"
             raise UserError(what, file=path, key="video", remedy=remedy)
         yield brightness(levels, top)
+
+
+def _split_pages(path: Path) -> str:
+    """Returns the command that writes each picture of a file to one of its own, beside it."""
+    code = (
+        "import cv2, sys; [cv2.imwrite(f'{sys.argv[2]}_{k:05}.tif', page) for k, page in"
+        " enumerate(cv2.imreadmulti(sys.argv[1], flags=cv2.IMREAD_UNCHANGED)[1])]"
+    )
+    python, *names = map(shlex.quote, (sys.executable, path.name, path.stem))
+    return f'{python} -c "{code}" {" ".join(names)}'

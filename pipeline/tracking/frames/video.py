@@ -1,6 +1,7 @@
 """Reads frames of a video, or of a folder of numbered pictures, with their times."""
 
 import math
+import shlex
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -172,7 +173,8 @@ def open_video(path: Path) -> av.container.InputContainer:
     try:
         return av.open(f"file:{path}", options=_ALONE)
     except av.ArgumentError as error:
-        made = f"ffmpeg -i {path.name} -c:v ffv1 {path.stem}.mkv"
+        ends = shlex.quote(path.name), shlex.quote(f"{path.stem}_ffv1.mkv")
+        made = "ffmpeg -i {} -c:v ffv1 {}".format(*ends)
         remedy = f"convert it, e.g. {made}; copy the file again if it is broken"
         what = "not a readable video: files of this kind are not read"
         raise UserError(what, file=path, key="video", remedy=remedy) from error
@@ -227,8 +229,8 @@ def _check_progressive(frame: av.VideoFrame, path: Path) -> None:
     """Refuses a frame of two fields, whose odd rows show another instant than the even ones."""
     if frame.interlaced_frame:
         remedy = (
-            f"deinterlace it first, e.g. ffmpeg -i {path.name} -vf bwdif OUT.mp4, or, if the camera"
-            " took all rows at once, -vf setfield=prog"
+            f"deinterlace it first, e.g. ffmpeg -i {shlex.quote(path.name)} -vf bwdif OUT.mp4, or,"
+            " if the camera took all rows at once, with setfield=prog in place of bwdif"
         )
         raise UserError("the video is interlaced", file=path, key="video", remedy=remedy)
 

@@ -1,6 +1,9 @@
 """Videos as they should not be: what can be tracked of them is."""
 
+import shlex
 import struct
+import subprocess
+import sys
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
@@ -224,8 +227,24 @@ def test_a_file_of_many_pictures_is_refused(tmp_path: Path, clip: list[np.ndarra
     assert cv2.imwritemulti(str(path), [clip[0], clip[0][::8, ::8].copy()])
     np.testing.assert_array_equal(next(read_frames(tmp_path, rate=1.0)).image, clip[0])
     assert cv2.imwritemulti(str(path), clip)
-    with refused(f"{len(clip)} pictures in one file", "video", "magick a1.tif", path):
+    with refused(f"{len(clip)} pictures in one file", "video", "take a1.tif away", path):
         next(read_frames(tmp_path, rate=1.0))
+
+
+def test_the_remedy_for_a_file_of_many_pictures_works_as_it_is_printed(
+    tmp_path: Path, clip: list[np.ndarray]
+) -> None:
+    path = tmp_path / "my run.tif"
+    deep = [(257 * picture.astype(np.uint16)) for picture in clip]
+    assert cv2.imwritemulti(str(path), deep)
+    with pytest.raises(UserError) as caught:
+        next(read_frames(tmp_path, rate=1.0))
+    program, *words = shlex.split(str(caught.value.remedy).partition(" away: ")[2])
+    assert program == sys.executable
+    subprocess.run([program, *words], cwd=tmp_path, check=True)
+    path.unlink()
+    shown = [frame.image for frame in read_frames(tmp_path, rate=1.0)]
+    np.testing.assert_allclose(shown, clip, atol=0.51)
 
 
 ONE = 1 << 16

@@ -142,8 +142,8 @@ def test_a_bare_stream_has_no_times_but_by_a_rate(tmp_path: Path, name: str, cod
 @pytest.mark.parametrize("codec", ["libx264", "mpeg2video"])
 def test_an_interlaced_video_is_refused(tmp_path: Path, codec: str) -> None:
     """Its odd rows show another instant than the even ones."""
-    path = written(tmp_path / "a.mkv", list(range(4)), codec, flags="+ildct+ilme")
-    with refused("interlaced", "video", "ffmpeg -i a.mkv -vf bwdif", path):
+    path = written(tmp_path / "my a.mkv", list(range(4)), codec, flags="+ildct+ilme")
+    with refused("interlaced", "video", "ffmpeg -i 'my a.mkv' -vf bwdif OUT.mp4", path):
         list(read_frames(path))
 
 
@@ -192,9 +192,19 @@ def test_a_cine_has_the_rate_at_which_it_was_taken(tmp_path: Path) -> None:
     np.testing.assert_array_equal([frame.image for frame in shown], images)
 
 
-def test_a_file_of_a_kind_that_is_not_read_is_told_so(tmp_path: Path) -> None:
-    path = written(tmp_path / "a.apng", [0, 1], "apng")
-    with refused("of this kind are not read", "video", "ffmpeg -i a.apng -c:v ffv1 a.mkv", path):
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        ("a.apng", "ffmpeg -i a.apng -c:v ffv1 a_ffv1.mkv"),
+        ("my a.apng", "ffmpeg -i 'my a.apng' -c:v ffv1 'my a_ffv1.mkv'"),
+        ("a.mkv", "ffmpeg -i a.mkv -c:v ffv1 a_ffv1.mkv"),  # not onto itself
+    ],
+)
+def test_a_file_of_a_kind_that_is_not_read_is_told_so(
+    tmp_path: Path, name: str, command: str
+) -> None:
+    path = written(tmp_path / "a.apng", [0, 1], "apng").rename(tmp_path / name)
+    with refused("of this kind are not read", "video", command, path):
         list(read_frames(path))
 
 
