@@ -28,6 +28,7 @@ from .structure_drawing import colour_bar as colour_bar
 from .structure_drawing import draw as draw
 from .structure_drawing import draw_clamps as draw_clamps
 from .structure_drawing import drive_arrows as drive_arrows
+from .structure_drawing import frame as frame
 from .structure_drawing import outline as outline
 from .structure_drawing import point as point
 from .structure_drawing import tints as tints

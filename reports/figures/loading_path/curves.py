@@ -32,6 +32,8 @@ RIGHT_AXIS = 9.0
 
 _FLAT = 0.05
 """Share of the altered structure's measure below which a curve is seen on a logarithmic axis."""
+_BELOW = 0.1
+"""Share of the upper limit of an axis by which the lower one is under zero if curves are."""
 _BESIDE_TITLE = (22.0, 25.4)  # points from the upper right corner, over a paper's label
 _LINE, _MOST_ROOM = 0.1, 0.6  # of a panel's height: a line of its legend, and all lines at most
 
@@ -254,7 +256,10 @@ def _sides(axes: Axes, study: StudyResults) -> None:
     if study.recordings:
         told = measured_overlay.handles(study.recordings)
         axes.legend(handles=told, loc="upper left", handlelength=1.6)
-        axes.set_ylim(None, (1.0 + 0.13 * len(told)) * axes.get_ylim()[1])
+        low, high = axes.get_ylim()
+        # curves that rise from zero begin below the legend, others need room below all of it
+        room = 0.13 * high if low > -_BELOW * high else 0.21 * (high - low)
+        axes.set_ylim(None, high + len(told) * room)
 
 
 def _plain_panel(

@@ -23,7 +23,7 @@ from reports.figures.loading_path.abscissa import (
     structures,
 )
 from reports.figures.loading_path.structure_panels import UnitColouring, shade_of
-from reports.panels import MARGIN, colour_bar, draw
+from reports.panels import MARGIN, colour_bar, draw, frame
 from reports.study import StudyResults, deformed, display_name, from_dataset
 
 LABEL, BAR, GAP = 6.0, 14.0, 1.2
@@ -341,10 +341,18 @@ def snapshot(
 ) -> None:
     """Draws one structure at one sample of its path, true to scale, `margin` mm about it."""
     structure = from_dataset(part, problem.lattice.spacing)
-    frame = part["displacement"].isel(case=case, time=sample).transpose("unit", "dof").values
-    values = shade.values(frame)
+    motion = part["displacement"].isel(case=case, time=sample).transpose("unit", "dof").values
+    if not np.isfinite(motion).any():  # at rest it would look as if nothing had moved
+        frame(axes, structure, margin)
+        words = "not\nrecorded"
+        axes.text(
+            0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center",
+            color=style.GREY, fontsize=style.SMALL,
+        )  # fmt: skip
+        return
+    values = shade.values(motion)
     colours = shade.colours
-    draw(axes, structure, frame, values=values, colour_map=colours, norm=shade.norm, margin=margin)
+    draw(axes, structure, motion, values=values, colour_map=colours, norm=shade.norm, margin=margin)
 
 
 def shade_bar(figure: Figure, shade: UnitColouring, place: tuple[float, float, float]) -> None:

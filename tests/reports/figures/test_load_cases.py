@@ -138,6 +138,48 @@ def test_snapshots_of_many_loads_are_wrapped(
     assert grid.path.shown[-1] == path.shown[-1]
 
 
+def test_a_snapshot_beyond_the_end_of_a_recording_is_told(
+    two: StudyResults, tmp_path: Path
+) -> None:
+    """It showed the structure at rest, as if nothing had moved under the load."""
+    filmed = recorded_study.with_recordings(two, tmp_path, ("cloaked", 0))
+    name, data = next(iter(filmed.compared.items()))
+    study = replace(filmed, compared={name: data.isel(time=slice(0, 4))})
+    path = abscissa.abscissa_of(study.problem, study.response)
+    shown = [row for row in snapshot_grid.rows(study) if "experiment" in row.label]
+    shade = structure_panels.shade_of(study.problem, study.response)
+    for sample, is_recorded in ((0, True), (path.shown[-1], False)):
+        axes = Figure().add_subplot()
+        snapshot_grid.snapshot(axes, study.problem, shown[0].part, sample, shade)
+        assert bool(axes.collections) == is_recorded
+        assert [text.get_text() for text in axes.texts] == ["not\nrecorded"] * (not is_recorded)
+
+
+def test_the_legend_is_above_curves_on_both_sides_of_zero(
+    two: StudyResults, tmp_path: Path
+) -> None:
+    turned = two.response.copy(deep=True)
+    turned["displacement"][:, 1] *= -1.0
+    datasets = two.datasets | {"response": turned}
+    study = recorded_study.with_recordings(
+        replace(two, datasets=datasets), tmp_path, ("cloaked", 0)
+    )
+    path = abscissa.abscissa_of(study.problem, study.response)
+    with style.styled():
+        made = style.page(60.0)
+        axes = style.place(made, 20.0, 10.0, 30.0, 27.0)
+        curves.contraction_panel(axes, study, path)
+        made.draw_without_rendering()
+    legend = axes.get_legend()
+    assert legend is not None
+    drawn = [np.asarray(line.get_ydata(), dtype=float) for line in axes.get_lines()]
+    most = max(float(np.nanmax(curve)) for curve in drawn)
+    least = min(float(np.nanmin(curve)) for curve in drawn)
+    assert least < -0.5 * most
+    top = float(axes.transData.transform((0.0, most))[1])
+    assert top <= legend.get_window_extent().y0
+
+
 def test_snapshots_hold_a_structure_that_is_pulled(smile: StudyResults) -> None:
     """Those of one that is pressed have the scale that they had."""
     pulled = smile.response.assign(displacement=-smile.response["displacement"])
