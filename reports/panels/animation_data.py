@@ -11,8 +11,9 @@ size, and knows nothing of what moves them. Its data is one JSON object:
     cases       [label]: what the load menu offers (angles, amplitudes; one entry: no menu);
     start       the case shown first.
     structures  [{name, colour, centroid (n_units, 2), arm (n_vertices, 2), owner (n_vertices,),
-                ligaments (n_ligaments, 2) vertex numbers, clamped, driven, marker}]
-                with polygons contiguous in `arm`, mm from their centroid; marker: a unit or null.
+                ligaments (n_ligaments, 2) vertex numbers, pads, driven, marker}]
+                with polygons contiguous in `arm`, mm from their centroid; pads: [[x, y]] of each
+                outline under clamped units; marker: a unit or null.
     motion      [structure][case] -> {step: [3], data}: `data` (n_frames, n_units, 3) int16;
                 displacement = step * data in mm, mm, rad; -32768 stands for "no data". Null where
                 there is none at all of a case: the structure is not shown.
@@ -21,8 +22,7 @@ size, and knows nothing of what moves them. Its data is one JSON object:
     fields      [{key, label, unit, factor, scale (3,), map, limits, residual}]: what may colour
                 the units. key "norm" is |u / scale|, "turn" |theta|, else ux, uy or theta; shown
                 times `factor`; `residual` are the limits of the residual's colours, or null.
-    maps        {name: 256 x 3 uint8}; circles [{x, y, radius, colour}], pad: side of the squares
-                under clamped units; all in mm.
+    maps        {name: 256 x 3 uint8}; circles [{x, y, radius, colour}], all in mm.
 
 Arrays are base64 of little-endian float32, int32, int16 or uint8, decoded without a library.
 """
@@ -37,7 +37,8 @@ from matplotlib.colors import Colormap
 from numpy.typing import NDArray
 
 from reports.base import style
-from reports.study import CLAMPED, DRIVEN, RigidUnits, deformed
+from reports.panels.structure_drawing import pads
+from reports.study import DRIVEN, RigidUnits, deformed
 from sim.core import Floats
 
 MOST_STEPS = 200
@@ -144,8 +145,7 @@ def payload(reel: Animation) -> dict[str, Any]:
         "speeds": [{"label": label, "rate": rate} for label, rate in axis.speeds.items()],
         "cases": list(reel.cases),
         "start": reel.start,
-        "pad": reel.pad,
-        "structures": [_structure(clip) for clip in clips],
+        "structures": [_structure(clip, reel.pad) for clip in clips],
         "motion": [_cases(clip.motion, frames) for clip in clips],
         "residual": [_cases(clip.residual, frames) for clip in clips],
         "fields": [_field(field, clips) for field in reel.fields],
@@ -200,7 +200,7 @@ def _quantised(motion: Floats) -> dict[str, Any]:
     return {"step": [float(value) for value in step], "data": encoded(levels, "<i2")}
 
 
-def _structure(clip: AnimationClip) -> dict[str, Any]:
+def _structure(clip: AnimationClip, pad: float) -> dict[str, Any]:
     structure = clip.structure
     present = ~np.isnan(structure.vertices[..., 0])
     number = np.cumsum(present).reshape(present.shape) - 1
@@ -213,7 +213,7 @@ def _structure(clip: AnimationClip) -> dict[str, Any]:
         "arm": encoded(arm, "<f4"),
         "owner": encoded(np.nonzero(present)[0], "<i4"),
         "ligaments": encoded(ends, "<i4"),
-        "clamped": np.flatnonzero(structure.support == CLAMPED).tolist(),
+        "pads": [ring.round(3).tolist() for ring in pads(structure, pad)],
         "driven": np.flatnonzero(structure.support == DRIVEN).tolist(),
         "marker": clip.marker,
     }

@@ -105,11 +105,20 @@ def draw_clamps(axes: Axes, structure: RigidUnits, pad: float) -> None:
         for x, y in corners:
             axes.add_patch(Rectangle((x, y), pad, pad, **look))
         return
-    joined = shapely.union_all(shapely.box(*corners.T, *(corners + pad).T))
+    for ring in pads(structure, pad):
+        axes.add_patch(Polygon(ring, **look))
+
+
+def pads(structure: RigidUnits, pad: float) -> list[Floats]:
+    """Returns outlines (n, 2) of the pads under clamped units; those that overlap are joined."""
+    corners = structure.centroid[structure.support == CLAMPED] - pad / 2
+    squares = shapely.box(*corners.T, *(corners + pad).T)
+    if not _overlap(corners, pad):
+        return [shapely.get_coordinates(square) for square in squares]
+    joined = shapely.union_all(squares)
     for reach in (0.1 * pad, -0.1 * pad):  # closes slits between them
         joined = joined.buffer(reach, join_style="mitre")
-    for part in shapely.get_parts(joined):
-        axes.add_patch(Polygon(shapely.get_coordinates(part.exterior), **look))
+    return [shapely.get_coordinates(part.exterior) for part in shapely.get_parts(joined)]
 
 
 def _overlap(corners: Floats, side: float) -> bool:

@@ -7,6 +7,8 @@ from selenium.webdriver.support.ui import Select
 
 from reports.figures.study_report import study_report
 from reports.page import publish
+from reports.panels import animation_data
+from reports.panels.structure_drawing import pads
 from tests.clients.conftest import Open
 from tests.clients.test_player import scrub
 from tests.reports import compressed_study
@@ -49,24 +51,29 @@ def test_units_that_are_cut_out_are_not_drawn(browser: Chrome) -> None:
     assert colours[1][3] == 0
 
 
-def test_pads_that_overlap_are_joined(browse: Open, page: Path, tmp_path: Path) -> None:
+def test_pads_that_overlap_are_joined(
+    browse: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Those of the units of a kagome lattice do: strokes of one crossed the next."""
-    text = page.read_text(encoding="utf-8")
-    assert '"pad": 15.0' in text
-    wide = tmp_path / "wide.html"
-    wide.write_text(text.replace('"pad": 15.0', '"pad": 20.0'), encoding="utf-8")
-    colours = browse(wide, 1100, 800, 2.0).execute_script(
+    smile = compressed_study.written(tmp_path, compressed_study.SMILE)
+    monkeypatch.setattr(animation_data, "pads", lambda structure, side: pads(structure, side + 5))
+    publish(study_report(smile), tmp_path / "report")
+    colours = browse(tmp_path / "report/index.html", 1100, 800, 2.0).execute_script(
         """
         const canvas = document.querySelector("#player .stage canvas");
         const pen = canvas.getContext("2d");
-        const pixel = (y) => {
-          const at = pen.getTransform().transformPoint(new DOMPoint(-8.5, y));
+        const pixel = (x, y) => {
+          const at = pen.getTransform().transformPoint(new DOMPoint(x, y));
           return [...pen.getImageData(Math.round(at.x), Math.round(at.y), 1, 1).data].join();
         };
-        return [...Array(200).keys()].map((k) => pixel(0.3 * k));
+        const inside = [...Array(200).keys()].map((k) => pixel(-8.5, 0.3 * k));
+        const across = [...Array(100).keys()].map((k) => pixel(-11 + 0.02 * k, 50));
+        return [inside, across];
         """
     )
-    assert set(colours) == {"212,215,219,255"}
+    inside, across = map(set, colours)
+    assert inside == {"212,215,219,255"}
+    assert "0,0,0,0" in across  # the edge is within the picture
 
 
 def test_colours_begin_with_that_of_the_figure(browser: Chrome) -> None:

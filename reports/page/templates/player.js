@@ -80,10 +80,12 @@
 
   // --- the page ----------------------------------------------------------------------------
 
-  const box = structures.reduce((found, { centroid, arm, owner }) => {
+  const box = structures.reduce((found, { centroid, arm, owner, pads }) => {
+    const corners = pads.flat();
     for (let v = 0; v < owner.length; v += 1) {
-      const x = centroid[2 * owner[v]] + arm[2 * v];
-      const y = centroid[2 * owner[v] + 1] + arm[2 * v + 1];
+      corners.push([centroid[2 * owner[v]] + arm[2 * v], centroid[2 * owner[v] + 1] + arm[2 * v + 1]]);
+    }
+    for (const [x, y] of corners) {
       found.left = Math.min(found.left, x);
       found.right = Math.max(found.right, x);
       found.low = Math.min(found.low, y);
@@ -172,17 +174,16 @@
     return out;
   };
 
-  // As one shape: pads of a kagome lattice overlap, and the strokes of one would cross the next.
-  const drawClamps = (pen, structure, pad) => {
-    pen.beginPath();
-    for (const unit of structure.clamped) {
-      pen.rect(structure.centroid[2 * unit] - pad / 2, structure.centroid[2 * unit + 1] - pad / 2,
-        pad, pad);
-    }
+  const drawClamps = (pen, structure) => {
     pen.strokeStyle = "#1a1a1a";
-    pen.stroke();
     pen.fillStyle = "#d4d7db";
-    pen.fill();
+    for (const pad of structure.pads) {
+      pen.beginPath();
+      for (const [x, y] of pad) pen.lineTo(x, y);
+      pen.closePath();
+      pen.fill();
+      pen.stroke();
+    }
   };
 
   const drawUnits = (pen, structure, points, shown) => {
@@ -233,9 +234,8 @@
     pen.clearRect(0, 0, canvas.width, canvas.height);
     pen.setTransform(scale, 0, 0, -scale, -extent.x * scale, extent.y * scale);
     pen.lineJoin = "round";
-    pen.lineWidth = 1.4 * pixel; // of which the pads cover half
-    drawClamps(pen, structure, data.pad);
     pen.lineWidth = 0.7 * pixel;
+    drawClamps(pen, structure);
     pen.strokeStyle = "#6b6f75";
     pen.beginPath();
     for (let k = 0; k < structure.ligaments.length; k += 2) {
