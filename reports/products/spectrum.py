@@ -27,8 +27,6 @@ SHOWN = 0.45
 """Largest motion of a drawn mode, in spacings."""
 _DECADES = 10.0
 """Spread of the transmission from which on its axis is logarithmic."""
-_BANDS = (style.INTACT, style.METHOD_COLOURS["mma"], style.ALTERED, style.CLOAKED)
-"""Colours of the bands, by compression; more compressions than these take a map's."""
 _SIDE, _PITCH, _LEFT, _TOP = 36.0, 41.5, 10.0, 9.0
 _ROW = _SIDE + 4.5
 
@@ -160,7 +158,6 @@ def bands_panel(axes: Axes, data: xr.Dataset, points: tuple[str, ...]) -> None:
 
 
 def _band_colours(count: int) -> Sequence[str]:
-    """Returns a colour for each compression."""
-    if count <= len(_BANDS):
-        return _BANDS[:count]
-    return [to_hex(style.MAGNITUDE(place)) for place in np.linspace(1.0, 0.25, count)]
+    """Returns a colour for each compression: none that stands for another structure elsewhere."""
+    paler = (to_hex(style.MAGNITUDE(place)) for place in np.linspace(0.7, 0.25, count - 1))
+    return [style.INTACT, *paler][:count]

@@ -5,6 +5,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from pipeline.problem.sections import Kagome
+from reports.base import style
 from reports.products.spectrum import bands_panel, zone_points
 
 
@@ -27,7 +28,11 @@ def test_every_compression_has_its_bands_and_its_colour(count: int) -> None:
     legend = axes.get_legend()
     assert legend is not None
     assert len(legend.get_texts()) == count
-    assert len({to_hex(str(line.get_color())) for line in axes.lines}) == count
+    colours = [to_hex(str(line.get_color())) for line in axes.lines]
+    assert len(set(colours)) == count
+    # all are of the intact lattice
+    assert colours[0] == style.INTACT
+    assert not {style.ALTERED, style.CLOAKED} & set(colours)
 
 
 @pytest.mark.parametrize(
