@@ -131,9 +131,11 @@ def unit_solid(unit: Unit, settings: Fabrication) -> PrintedPart:
     lettering = _lettering(unit, inner, settings)
     while _is_pinched(base := outline.difference(lettering)):
         lettering = engraved_area(lettering)
-    first = inner.difference(lettering)
+    lettered = solid_area(base)
+    # Without an inset both layers are of one area, and what is made of it is made once.
+    first = solid_area(inner.difference(lettering)) if inset else lettered
     split = min(settings.print.layer, sunk)
-    layers = [Layer(solid_area(first), 0.0, split), Layer(solid_area(base), split, sunk)]
+    layers = [Layer(first, 0.0, split), Layer(lettered, split, sunk)]
     if marks.kind == "recess":
         layers.append(Layer(outline, sunk, height - marks.depth))
         layers.append(Layer(solid_area(outline.difference(dots)), height - marks.depth, height))
