@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from shapely import Geometry, LineString, Point, Polygon
+from shapely import Geometry, LineString, Polygon
 
 from pipeline.fabrication.readback import BUG, Fault
 from pipeline.problem.sections import Fabrication
@@ -102,14 +102,11 @@ def _short_sides(shape: Geometry, vertex: Floats) -> tuple[tuple[Floats, Floats]
 def _lip(made: Polygon, inner: Floats, axis: Floats) -> float:
     """Measures the thinnest wall beside the mouth; the tips may be cut back unevenly."""
     across = np.array([-axis[1], axis[0]])
-    walls = []
-    for corner in inner:
-        aside = across * np.sign((corner - inner.mean(axis=0)) @ across)
-        start = corner + _HAIR * aside
-        beside = _first(LineString([start, start - _FAR * axis]), made)
-        tip = start - (beside - _BACK) * axis
-        walls.append(_first(LineString([tip, tip + _FAR * aside]), made))
-    return min(walls)
+    aside = np.sign((inner - inner.mean(axis=0)) @ across)[:, None] * across
+    starts = inner + _HAIR * aside
+    beside = _through(starts, -np.stack([axis, axis]), made)
+    tips = starts - (beside - _BACK)[:, None] * axis
+    return float(_through(tips, aside, made).min())
 
 
 def _held(made: Polygon, inner: Floats, axis: Floats) -> LineString:
@@ -120,16 +117,19 @@ def _held(made: Polygon, inner: Floats, axis: Floats) -> LineString:
     end, across = inner.mean(axis=0), _unit(inner[1] - inner[0])
     way = np.array([-across[1], across[0]]) * np.sign(axis @ [-across[1], across[0]])
     starts = inner + _BACK * np.array([[-1.0], [1.0]]) * across
-    walls = [_first(LineString([start, start - _FAR * way]), made) for start in starts]
-    grip = max(_HAIR, min(walls))
+    walls = _through(starts, -np.stack([way, way]), made)
+    grip = max(_HAIR, float(walls.min()))
     return LineString([end - grip * way, end])
 
 
-def _first(ray: LineString, made: Polygon) -> float:
-    """Measures how far a ray goes through a unit before it leaves it."""
-    start = Point(ray.coords[0])
-    pieces = shapely.get_parts(ray.intersection(made))
-    return max((piece.length for piece in pieces if piece.distance(start) < _HAIR), default=0.0)
+def _through(starts: Floats, ways: Floats, made: Polygon) -> Floats:
+    """Measures how far (n,) rays along unit vectors (n, 2) go through a unit before they leave."""
+    rays = shapely.linestrings(np.stack([starts, starts + _FAR * ways], axis=1))
+    pieces, ray = shapely.get_parts(shapely.intersection(rays, made), return_index=True)
+    first = shapely.distance(pieces, shapely.points(starts)[ray]) < _HAIR
+    reach = np.zeros(len(starts))
+    np.maximum.at(reach, ray[first], shapely.length(pieces[first]))
+    return reach
 
 
 def _unit(vector: Floats) -> Floats:

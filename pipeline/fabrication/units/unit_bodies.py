@@ -126,14 +126,11 @@ def unit_body(
             failure = error
             continue
         body = lugs(plain, room, chosen, settings) if share > 0.0 else plain
-        outline = cut(body, chosen, settings)
+        truncated = [side_truncations(body, slot, settings) for slot in chosen]
+        outline = cut(body, chosen, truncated, settings)
         slots = tuple(
-            replace(
-                slot,
-                truncation=max(side_truncations(body, slot, settings)),
-                wall=min(slot.wall, wall(outline, slot)),
-            )
-            for slot in chosen
+            replace(slot, truncation=max(sides), wall=min(slot.wall, wall(outline, slot)))
+            for slot, sides in zip(chosen, truncated, strict=True)
         )
         if all(_is_held(slot, settings) for slot in slots):
             return UnitBody(body, slots, outline)

@@ -8,7 +8,6 @@ from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from pipeline.fabrication.parts import Slot
-from pipeline.fabrication.units.slot_candidates import side_truncations
 from pipeline.problem.sections import Fabrication
 from sim.core import Floats
 
@@ -56,17 +55,28 @@ def lugs(polygon: Polygon, room: Polygon, slots: Iterable[Slot], settings: Fabri
     return _largest(body) if body is not polygon else polygon
 
 
-def cut(body: Polygon, slots: Sequence[Slot], settings: Fabrication) -> Polygon:
+def cut(
+    body: Polygon,
+    slots: Sequence[Slot],
+    truncated: Sequence[tuple[float, float]],
+    settings: Fabrication,
+) -> Polygon:
     """Cuts the slots into a body, and the tips beside their mouths back.
 
     In front of its mouth a cut leaves the walls around the inner ends of other slots alone.
+
+    Args:
+        body: the unit without slots.
+        slots: to be cut.
+        truncated: how far the tip on the right and on the left of each slot is cut back.
+        settings: widths of tips and walls.
     """
     held = {slot.vertex: _across(slot).buffer(settings.minimum_wall) for slot in slots}
     waste: list[BaseGeometry] = []
-    for slot in slots:
+    for slot, lengths in zip(slots, truncated, strict=True):
         walls = [area for vertex, area in held.items() if vertex != slot.vertex]
         kept = shapely.intersection(_front(slot), shapely.union_all(walls))
-        waste += [_channel(slot).difference(kept), *_tips(body, slot, settings)]
+        waste += [_channel(slot).difference(kept), *_tips(slot, lengths, settings)]
     # On a grid: in full precision GEOS's union may drop a piece whose edge touches another's.
     made = _largest(body.difference(shapely.union_all(waste, grid_size=GRID)))
     return _largest(shapely.set_precision(made.simplify(_SHORT), GRID))
@@ -105,9 +115,9 @@ def _front(slot: Slot) -> Polygon:
     return _rectangle(slot, -_BACK * slot.width, 0.0, -side, side)
 
 
-def _tips(body: Polygon, slot: Slot, settings: Fabrication) -> Iterable[Polygon]:
+def _tips(slot: Slot, truncated: tuple[float, float], settings: Fabrication) -> Iterable[Polygon]:
     """Yields where the walls beside the slot are thinner than the tips."""
-    right, left = side_truncations(body, slot, settings)
+    right, left = truncated
     side = slot.width / 2 + settings.slots.tip + GRID
     # From the middle of the slot: rectangles that only touch may leave a hairline between them.
     for length, across in ((right, (-side, 0.0)), (left, (0.0, side))):

@@ -95,7 +95,8 @@ def test_slots_leave_walls_keep_apart_and_are_open(polygon: Polygon, direction: 
         except NoRoomError:
             assume(False)
     body = lugs(polygon, room, slots, wanted)
-    made = cut(body, slots, wanted)
+    truncated = [side_truncations(body, slot, wanted) for slot in slots]
+    made = cut(body, slots, truncated, wanted)
     assert made.is_valid
     assert not made.interiors
     for slot in slots:
@@ -118,7 +119,7 @@ def test_tips_are_cut_back_to_the_asked_thickness(angle: float, tip: float) -> N
     right, left = side_truncations(polygon, slot, wanted)
     exact = (wanted.slot_width / 2 + tip) / np.tan(half)
     assert (right, left) == pytest.approx((exact, exact))
-    made = cut(polygon, [slot], wanted)
+    made = cut(polygon, [slot], [(right, left)], wanted)
     for sign in (-1.0, 1.0):
         across = LineString([(exact + 1e-3, 0.0), (exact + 1e-3, sign * 20.0)])
         assert across.intersection(made).length >= tip
