@@ -132,10 +132,10 @@ def unit_solid(unit: Unit, settings: Fabrication) -> PrintedPart:
     while _is_pinched(base := outline.difference(lettering)):
         lettering = engraved_area(lettering)
     lettered = solid_area(base)
-    # Without an inset both layers are of one area, and what is made of it is made once.
-    first = solid_area(inner.difference(lettering)) if inset else lettered
-    split = min(settings.print.layer, sunk)
-    layers = [Layer(first, 0.0, split), Layer(lettered, split, sunk)]
+    split = min(settings.print.layer, sunk) if inset else 0.0
+    layers = [Layer(lettered, split, sunk)]
+    if inset:
+        layers.insert(0, Layer(solid_area(inner.difference(lettering)), 0.0, split))
     if marks.kind == "recess":
         layers.append(Layer(outline, sunk, height - marks.depth))
         layers.append(Layer(solid_area(outline.difference(dots)), height - marks.depth, height))

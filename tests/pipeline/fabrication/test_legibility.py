@@ -93,7 +93,7 @@ def test_the_id_of_a_slender_unit_is_read_on_both_sides(name: str) -> None:
     assert read(words, mirrored(unit.underside) + unit.mark) is not None
     if unit.letter:
         assert read(unit.label, unit.lettering + unit.mark) is None
-    sunk = unit.outline.difference(unit_solid(unit, Fabrication()).layers[1].area)
+    sunk = unit.outline.difference(unit_solid(unit, Fabrication()).layers[0].area)
     lines = MultiLineString([LineString(stroke) for stroke in unit.underside])
     assert sunk.covers(lines.intersection(unit.outline.buffer(-0.2, join_style="mitre")))
 
