@@ -26,7 +26,7 @@ def __getattr__(name: str) -> ModuleType:
     return importlib.import_module(f"{__name__}.{name}")
 
 
-class _Beside(MetaPathFinder, Loader):
+class _CheckoutFinder(MetaPathFinder, Loader):
     """Finds `metacloak.sim.x` as `sim.x`, which lies beside this package in a checkout."""
 
     def find_spec(
@@ -51,6 +51,6 @@ class _Beside(MetaPathFinder, Loader):
 
 
 if not (_HERE / "sim").is_dir():
-    sys.meta_path.insert(0, _Beside())
+    sys.meta_path.insert(0, _CheckoutFinder())
     if find_spec("sim") is None:
         sys.path.append(str(_HERE.parent))

@@ -184,7 +184,7 @@ def doubts(asked: Problem, scene: Scene) -> Iterator[str]:
                 f"rows of hexagons buckle when they are pushed by {BUCKLING * size:.2g} mm or so,"
                 " which no cloak hides: pull them (`drive.directions: [0 deg]`), or push them less"
             )
-    yield from _idle(asked)
+    yield from _unused_keys(asked)
     yield from _cut_off(asked)
     yield from _shown(asked)
     yield from _picture(asked)
@@ -263,7 +263,7 @@ def _inward(drive: SingleDrive, scene: Scene) -> bool:
     return bool((np.cos(ways) * outward[0] + np.sin(ways) * outward[1] < -1e-6).any())
 
 
-def _idle(asked: Problem) -> Iterator[str]:
+def _unused_keys(asked: Problem) -> Iterator[str]:
     """Doubts keys of other values than by default, which nothing in the problem takes up."""
     moving, avoiding = not asked.static, asked.objective.snap == "avoid"
     twice = "sqp" in asked.optimiser.methods.chosen and asked.contact.law == "geometric"

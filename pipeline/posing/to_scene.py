@@ -306,11 +306,11 @@ def _motions(drive: SingleDrive, horizon: float, folder: Path) -> tuple[loads.Mo
     if isinstance(drive, TimeSeriesDrive):
         return (_measured(folder / drive.file),)
     if isinstance(drive, TorqueDrive | RotationDrive):
-        return (loads.Turning(_course(drive, 0.0, horizon)),)
-    return tuple(_course(drive, angle, horizon) for angle in drive.directions)
+        return (loads.Turning(_motion_law(drive, 0.0, horizon)),)
+    return tuple(_motion_law(drive, angle, horizon) for angle in drive.directions)
 
 
-def _course(
+def _motion_law(
     drive: DirectedDrive | TorqueDrive | RotationDrive, direction: float, horizon: float
 ) -> loads.MotionLaw:
     """Builds the course of a drive along a direction, rad; of a moment, as if it were a force."""
@@ -326,10 +326,10 @@ def _course(
             return loads.TanhRamp(size, drive.duration, direction)
         case LinearRampDrive():
             return loads.LinearRamp(size, drive.duration, direction)
-    return _load_course(drive, direction, horizon)
+    return _load_law(drive, direction, horizon)
 
 
-def _load_course(
+def _load_law(
     drive: ForceDrive | TorqueDrive | RotationDrive, direction: float, horizon: float
 ) -> loads.MotionLaw:
     """Builds the course of a load that may be a pulse, a wave or a path."""

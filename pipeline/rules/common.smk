@@ -17,7 +17,7 @@ wildcard_constraints:
 onstart:
     made = [file for job in workflow.dag.needrun_jobs() for file in job.output]
     if made:  # and not only removed
-        rule_inputs.check_room("results")
+        rule_inputs.check_writable("results")
     rule_inputs.hold_studies(made)
     if not workflow.non_local_exec:
         interrupts.end_jobs(spared=stage_server.start())

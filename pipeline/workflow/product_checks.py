@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pipeline.problem import Problem
 
 
-class _Wanted(NamedTuple):
+class _Requirement(NamedTuple):
     """Describes what a product needs of a problem."""
 
     what: str
@@ -34,19 +34,19 @@ class _Wanted(NamedTuple):
 
 
 _OF_PROBLEM = {
-    "_spectrum": _Wanted(
+    "_spectrum": _Requirement(
         "the study asks for no linear analysis",
         "spectrum",
         "give the section spectrum, with transmission: {from: 5 Hz, to: 200 Hz}",
         lambda asked: asked.spectrum is not None,
     ),
-    "_sweep": _Wanted(
+    "_sweep": _Requirement(
         "the study asks for no sweep",
         "sweep",
         "add sweep.grid, sweep.list or sweep.random",
         lambda asked: asked.sweep is not None,
     ),
-    "_certificate": _Wanted(
+    "_certificate": _Requirement(
         "the study asks for no loads in ranges",
         "objective.loads",
         "add objective.loads",

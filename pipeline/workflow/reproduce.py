@@ -13,7 +13,7 @@ from pathlib import Path
 from pipeline.datasets import file_hash
 from pipeline.runtime import INSTALLED, ROOT, UserError
 from pipeline.workflow.runs import SNAKEMAKE
-from pipeline.workflow.studies import asked_for, problem_of
+from pipeline.workflow.studies import problem_of, requested
 from pipeline.workflow.target_words import check_words
 
 LOG = logging.getLogger(__name__)
@@ -61,7 +61,7 @@ def work(args: argparse.Namespace) -> None:
         what = "what is built twice are the studies of a checkout, which an installed package lacks"
         raise UserError(what, remedy="clone the repository, and there: make reproduce STUDY=name")
     check_words([args.target])
-    for study in asked_for([args.target]):
+    for study in requested([args.target]):
         problem_of(study)
     place = Path(tempfile.mkdtemp(prefix="reproduce_"))
     LOG.info("building twice in %s, which stays if that fails", place)

@@ -32,11 +32,11 @@ from pipeline.workflow.recordings import recording_pages, shown_recordings
 from pipeline.workflow.runs import Run, study_lock
 from pipeline.workflow.studies import (
     Study,
-    asked_for,
     check_calibrations,
     check_names,
     check_targets,
     problem_of,
+    requested,
     targets,
     together,
 )
@@ -151,7 +151,7 @@ def check_problems(words: Sequence[str]) -> None:
         if any("calibrat" in word for word in words):
             check_calibrations()
         check_words(words)
-        for study in asked_for(words):
+        for study in requested(words):
             check_names(study)
             check_measured_constants(problem_of(study), WORK / "experiments" / study.name)
         check_products(words)
@@ -164,7 +164,7 @@ def no_target(_: Wildcards) -> NoReturn:
     sys.exit(f"error: nothing to build\n  remedy: {available_targets()}")
 
 
-def check_room(folder: str) -> None:
+def check_writable(folder: str) -> None:
     """Ends the process with one clear message if results cannot be written to the folder."""
     path = Path(folder)
     try:

@@ -69,7 +69,7 @@ def families(root: Path = WORK) -> Mapping[Study, list[Study]]:
     """
     found = {}
     for path in sorted(root.glob("experiments/*/problem.yaml")):
-        content = reading.yaml_file.skim_yaml(path)
+        content = reading.yaml_file.read_quickly(path)
         presets = content.pop("presets", None)
         for preset, laid in {"": {}, **(presets if isinstance(presets, dict) else {})}.items():
             whole = reading.overlay_keys(content, laid if isinstance(laid, dict) else {})
@@ -134,7 +134,7 @@ def present(named: Mapping[str, Collection[str]]) -> dict[str, list[Study]]:
     }
 
 
-def asked_for(words: Collection[str]) -> list[Study]:
+def requested(words: Collection[str]) -> list[Study]:
     """Finds the studies that a command line names, by target or by a file of theirs.
 
     A preset counts even if its problem file has none of that name: reading the problem tells so.

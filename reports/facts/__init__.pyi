@@ -8,7 +8,7 @@ from . import recording_facts as recording_facts
 from .checks import JUMPED as JUMPED
 from .checks import stability_facts as stability_facts
 from .claims import MEASURED as MEASURED
-from .claims import JudgedClaim as JudgedClaim
+from .claims import AssessedClaim as AssessedClaim
 from .design_tables import Columns as Columns
 from .design_tables import headed as headed
 from .design_tables import headed_columns as headed_columns

@@ -1,4 +1,4 @@
-"""Describes claims in numbers, the paper's and our own, judged by the facts of the reports.
+"""Describes claims in numbers, the paper's and our own, assessed by the facts of the reports.
 
 reports/facts/claims.yaml lists the paper's, own_claims.yaml ours; all but the values is computed.
 """
@@ -84,7 +84,7 @@ class Side:
 
 
 @dataclass(frozen=True)
-class JudgedClaim:
+class AssessedClaim:
     """Describes a claim with what became of it; `note` tells how our number is taken."""
 
     claim: Claim
@@ -112,7 +112,7 @@ def own() -> Claims:
     return load_section(Path(__file__).with_name("own_claims.yaml"), Claims)
 
 
-def judged(study: str, facts: Sequence[Fact]) -> list[JudgedClaim]:
+def assessed(study: str, facts: Sequence[Fact]) -> list[AssessedClaim]:
     """Returns the claims on a study, by the facts of its report; with none of them, all are open.
 
     Raises:
@@ -120,15 +120,15 @@ def judged(study: str, facts: Sequence[Fact]) -> list[JudgedClaim]:
     """
     known = {fact.key: fact for fact in facts}
     every = (*listed().claims, *own().claims)
-    return [_judge(claim, known) for claim in every if claim.study == study]
+    return [_assess(claim, known) for claim in every if claim.study == study]
 
 
-def quoted(found: Sequence[JudgedClaim]) -> bool:
+def quoted(found: Sequence[AssessedClaim]) -> bool:
     """Tells whether claims are the paper's."""
     return any(each.claim.ours is None for each in found)
 
 
-def verdict(found: Sequence[JudgedClaim], label: str = "") -> str:
+def verdict(found: Sequence[AssessedClaim], label: str = "") -> str:
     """Tells how many claims hold, in one line; `label` marks an experiment that was rendered."""
     simulated = [each.simulation.status for each in found]
     both = [each for each in found if each.claim.of == "both"]
@@ -146,7 +146,7 @@ def _counted(statuses: Sequence[Status]) -> str:
     return f"{words} ({waiting} not yet evaluated)" if waiting else words
 
 
-def _judge(claim: Claim, known: Mapping[str, Fact]) -> JudgedClaim:
+def _assess(claim: Claim, known: Mapping[str, Fact]) -> AssessedClaim:
     prefix, dot, key = claim.fact.rpartition(".")
     spacing = known.get(f"{prefix}{dot}spacing") or known.get("spacing")
     fact = known.get(claim.fact)
@@ -156,7 +156,7 @@ def _judge(claim: Claim, known: Mapping[str, Fact]) -> JudgedClaim:
     if claim.of == "both":
         measured = known.get(f"{prefix}{dot}{MEASURED}{key}")
         experiment = _side(claim, measured, spacing, "no recording compared")
-    return JudgedClaim(claim, simulation, experiment, fact.note if fact else "")
+    return AssessedClaim(claim, simulation, experiment, fact.note if fact else "")
 
 
 def _side(claim: Claim, fact: Fact | None, spacing: Fact | None, missing: str) -> Side:

@@ -102,7 +102,7 @@ def study_page(
     several = list(studies.values())
     draft = list(dict.fromkeys(reason for study in several for reason in study.draft))
     claimed = text.claimed or (studies[""].target if single else name)
-    judged = [] if draft else claims.judged(claimed, facts)
+    judged = [] if draft else claims.assessed(claimed, facts)
     recordings = studies[""].recordings if single else []
     synthetic = SYNTHETIC_LABEL if any(each.synthetic for each in recordings) else ""
     targets = [together[0]] if together else [study.target for study in several]
@@ -124,9 +124,9 @@ def study_page(
         "player_note": " ".join(filter(None, [rounding(player), text.note])),
         "provenance": [each for label, study in studies.items() for each in sources(study, label)],
         "problem": _json(asked or problems),
-        "skipped": _told_of(studies, _skipped),
+        "skipped": _notes_of(studies, _skipped),
         "draft": draft,
-        "warnings": _told_of(studies, _warnings),
+        "warnings": _notes_of(studies, _warnings),
         "recordings": recordings,
         "synthetic": synthetic,
         "claims": judged,
@@ -157,7 +157,7 @@ def rounding(player: Mapping[str, Any]) -> str:
     )
 
 
-def _told_of(
+def _notes_of(
     studies: Mapping[str, StudyResults], tell: Callable[[StudyResults], list[str]]
 ) -> list[str]:
     """Lists what is told of studies, each once, with the names of those that it holds for."""

@@ -82,7 +82,7 @@ class StaticSolver:
     ) -> tuple[Floats, Floats, StaticRecord]:
         """See ``Solver``."""
         check_connected(self.topology)
-        passed, last = self._way(drive)
+        passed, last = self._load_steps(drive)
         loads = drive.values(self.topology.held, passed)
         branch = _empty_branch(len(loads), self.topology.n_dofs)
         counts, progress = np.zeros(4, dtype=np.int64), np.zeros(4)
@@ -149,7 +149,7 @@ class StaticSolver:
         left = np.arange(self.substeps - 1, -1, -1) / self.substeps
         return (self.output_times[:, None] - way[:, None] * left).ravel()
 
-    def _way(self, drive: PrescribedMotion) -> tuple[Floats, Ints]:
+    def _load_steps(self, drive: PrescribedMotion) -> tuple[Floats, Ints]:
         """Lists the load parameters of all loads, and the numbers (n_times,) of the output ones.
 
         What a structure does there depends on how far it was moved before: the peaks of a series

@@ -8,7 +8,7 @@ import yaml
 from snakemake.iocontainers import Wildcards
 
 from pipeline.workflow.product_checks import check_products
-from pipeline.workflow.rule_inputs import check_room, figure_hash, products, shown_datasets
+from pipeline.workflow.rule_inputs import check_writable, figure_hash, products, shown_datasets
 from tests.tables import cases, refused, some
 from tests.workflow.conftest import Sandbox
 
@@ -254,7 +254,7 @@ def test_names_that_targets_cannot_have_are_refused(sandbox: Sandbox, name: str)
 def test_folder_that_cannot_be_made_is_one_message(tmp_path: Path) -> None:
     (tmp_path / "results").write_text("a file in the place of the folder")
     with pytest.raises(SystemExit, match=r"error: results cannot be written[^|]*remedy"):
-        check_room(str(tmp_path / "results"))
+        check_writable(str(tmp_path / "results"))
 
 
 def test_full_disk_is_one_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -263,7 +263,7 @@ def test_full_disk_is_one_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(os, "posix_fallocate", full)
     with pytest.raises(SystemExit, match="No space left on device"):
-        check_room(str(tmp_path))
+        check_writable(str(tmp_path))
     assert not list(tmp_path.iterdir())
 
 

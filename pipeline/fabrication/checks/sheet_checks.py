@@ -37,11 +37,11 @@ def check_curves(drawing: Drawing) -> Iterator[Fault]:
         if not curve.line.is_simple:
             what = f"a cut that crosses or repeats itself on layer {curve.layer}"
             yield drawing.fault(what, curve.part, (curve.line,))
-    for first, second, spot in _meetings(cuts):
+    for first, second, spot in _intersections(cuts):
         what = f"a cut meets one of {second.part or 'another curve'}"
         yield drawing.fault(what, first.part, (first.line, spot))
     strokes = [c for c in drawing.curves if c.layer not in _CUTS and len(c.points) > 1]
-    for first, second, spot in _meetings(strokes):
+    for first, second, spot in _intersections(strokes):
         if first.layer == second.layer and spot.length > _SHORTEST:
             what = f"a line twice on layer {first.layer}"
             yield drawing.fault(what, first.part, (first.line, spot))
@@ -89,7 +89,7 @@ def _curve_faults(curve: Curve) -> Iterator[str]:
         yield f"a segment of no length on layer {curve.layer}"
 
 
-def _meetings(curves: Sequence[Curve]) -> Iterator[tuple[Curve, Curve, Geometry]]:
+def _intersections(curves: Sequence[Curve]) -> Iterator[tuple[Curve, Curve, Geometry]]:
     """Yields pairs of curves that cross, touch or overlap, and where they do."""
     lines = np.array([curve.line for curve in curves])
     if len(lines) == 0:
@@ -231,7 +231,7 @@ def check_compensation(
         return
     for (part, layer), cuts in ours.items():
         shift = kerf / 2 if layer == OUTER else -kerf / 2
-        way = _way(ours.get((part, OUTER), ()), theirs.get((part, OUTER), ()), kerf)
+        way = _displacement(ours.get((part, OUTER), ()), theirs.get((part, OUTER), ()), kerf)
         for (drawing, curve), (_, drawn) in zip(cuts, theirs[part, layer], strict=True):
             if not _is_offset(curve.polygon, drawn.polygon, shift, way):
                 what = f"not {abs(shift):g} mm {'out' if shift > 0 else 'in'} of the nominal cut"
@@ -248,7 +248,7 @@ def _closed_cuts(drawings: Sequence[Drawing]) -> dict[tuple[str, str], list[tupl
     return cuts
 
 
-def _way(
+def _displacement(
     ours: Sequence[tuple[Drawing, Curve]], theirs: Sequence[tuple[Drawing, Curve]], kerf: float
 ) -> Floats:
     """Measures the way (2,) from a part to where it lies at nominal size; NaN of many alike."""

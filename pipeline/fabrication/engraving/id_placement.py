@@ -81,7 +81,7 @@ def _placements(
     """Yields an id as it fits into a place, from the best to the last resort."""
     for height, stacked, margin, angle in _attempts(place, settings.height):
         box = _framed(text_extent(words, height, stacked=stacked), height, margin, settings)
-        centre = _room_for(box, angle, place)
+        centre = _free_centre(box, angle, place)
         if centre is not None:
             plain = text_strokes(words, height, stacked=stacked)
             mirrored = tuple(stroke * [-1.0, 1.0] for stroke in plain)
@@ -198,7 +198,7 @@ def _slope(outline: Polygon) -> float:
     return float(np.arctan2(y, x) if x > 0 or (x == 0 and y > 0) else np.arctan2(-y, -x))
 
 
-def _room_for(
+def _free_centre(
     box: Box, angle: float, outline: Polygon, near: shapely.Point | None = None
 ) -> tuple[float, float] | None:
     """Finds the centre of a box in an outline, nearest to its centroid or to ``near``."""
@@ -295,7 +295,7 @@ def _arrows(place: BaseGeometry, near: shapely.Point, settings: Labels) -> Itera
         pen = min(settings.stroke, 0.4 * size)
         for margin in _MARGINS:
             box = (size + pen + 2 * margin, 0.75 * size + pen + 2 * margin)
-            centre = _room_for(box, 0.0, place, near)
+            centre = _free_centre(box, 0.0, place, near)
             if centre is not None:
                 scaled = tuple((grid_points(line) - [2.0, 1.5]) * size / 4 for line in _ARROW)
                 yield transformed(scaled, 0.0, centre)

@@ -120,12 +120,12 @@ def bill_rows(
     mass, volume = _sum(units, "mass"), _sum(units, "volume")
     labels = {unit.id for unit in units}
     plates = [prints[file] for file in prints if labels.issuperset(contents[file])]
-    note = _mass_words(mass, volume, _whole(plates), settings, infill)
+    note = _mass_words(mass, volume, _total(plates), settings, infill)
     yield BillRow("total", "units", len(units), volume=volume, mass=mass, note=note)
     mass, volume = _sum(shims, "mass"), _sum(shims, "volume")
     count = sum(row.count for row in shims)
     yield BillRow("total", "shims", count, volume=volume, mass=mass, note="polyester")
-    whole = _whole(prints.values())
+    whole = _total(prints.values())
     volume, mass = whole.filament * STRAND, _grams(whole, settings)
     note = _print_words(whole, settings)
     yield BillRow("total", "prints", len(prints), volume=volume, mass=mass, note=note)
@@ -244,15 +244,15 @@ def _foil(
     pieces = shim_pieces(specimen, settings)
     free = [replace(piece, tabs=()) for piece in pieces]
     sheets = [file for file in contents if file.startswith("laser/shims_") and "nominal" in file]
-    yield _way("free pieces", len(free), free, drawn=tabs is None)
+    yield _foil_row("free pieces", len(free), free, drawn=tabs is None)
     if tabs is not None:
-        yield _way("sheets of pieces on tabs", len(sheets), pieces, drawn=True)
+        yield _foil_row("sheets of pieces on tabs", len(sheets), pieces, drawn=True)
     if specimen.in_rows:
         joined = strip_parts(specimen, settings)
-        yield _way("strips, one a row and a column", len(joined), joined, drawn=False)
+        yield _foil_row("strips, one a row and a column", len(joined), joined, drawn=False)
 
 
-def _way(name: str, count: int, parts: Sequence[FlatPart], *, drawn: bool) -> BillRow:
+def _foil_row(name: str, count: int, parts: Sequence[FlatPart], *, drawn: bool) -> BillRow:
     """Tells the cuts and scored lines of foil, and their time on a laser cutter."""
     lines = [line for part in parts for line in (*part.cuts, *part.scores)]
     path = sum(LineString(line).length for line in lines)
@@ -296,7 +296,7 @@ def _mass_words(
     return words
 
 
-def _whole(prints: Collection[PrintEstimate]) -> PrintEstimate:
+def _total(prints: Collection[PrintEstimate]) -> PrintEstimate:
     """Adds up the estimates of some plates."""
     return PrintEstimate(sum(p.seconds for p in prints), sum(p.filament for p in prints))
 

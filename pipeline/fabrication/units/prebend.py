@@ -36,7 +36,7 @@ class PreBend(NamedTuple):
 
 def prebend(first: Slot, second: Slot, settings: Fabrication) -> PreBend:
     """Computes how the shim between the slots of two units is bent."""
-    shims, (start, end) = settings.shims, _ways(first, second)
+    shims, (start, end) = settings.shims, _slot_directions(first, second)
     strip = strip_between(first.held, start, second.held, end)
     stiffness = shims.young_modulus * settings.thickness * shims.thickness**3 / 12.0  # E I
     strain, moment = shims.thickness / 2.0 * strip.curvature, stiffness * strip.curvature
@@ -46,18 +46,18 @@ def prebend(first: Slot, second: Slot, settings: Fabrication) -> PreBend:
 def slot_angles(first: Slot, second: Slot) -> tuple[float, float]:
     """Measures the slots at both ends of a ligament against it, rad, counter-clockwise."""
     along = second.mouth - first.mouth
-    start, end = (float(angle_between(along, way)) for way in _ways(first, second))
+    start, end = (float(angle_between(along, way)) for way in _slot_directions(first, second))
     return start, end
 
 
 def slender_strain(first: Slot, second: Slot, settings: Fabrication) -> float:
     """Estimates the strain of the shim between two slots, by small slopes."""
-    start, end = _ways(first, second)
+    start, end = _slot_directions(first, second)
     curvature = peak_curvature(first.held, start, second.held, end)
     return settings.shims.thickness / 2.0 * float(curvature)
 
 
-def _ways(first: Slot, second: Slot) -> tuple[Floats, Floats]:
+def _slot_directions(first: Slot, second: Slot) -> tuple[Floats, Floats]:
     """Returns unit vectors (2,) along a shim, out of one slot and into the other."""
     return -first.direction, second.direction
 

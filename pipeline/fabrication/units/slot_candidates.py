@@ -100,7 +100,7 @@ def _turns_and_depths(
     """Lists turns and depths to try, also along the ways that slots may be asked to point."""
     slots = settings.slots
     depths = np.unique([*_depths(settings), _designed_depth(polygon, corner, settings)])
-    _, ways = _ways(polygon, corner)
+    _, ways = _slot_directions(polygon, corner)
     exact = [angle_between(ways[slots.direction], way) for way in ways.values()]
     offered = np.unique(np.round([*_TURNS, *exact], 6)) if corner.turn is None else corner.turn
     turns, depths = np.meshgrid(offered, depths)
@@ -159,7 +159,7 @@ def _strains(
     return settings.shims.thickness / 2.0 * peak_curvature(start, -directions, end, enters)
 
 
-def _ways(polygon: Polygon, corner: Corner) -> tuple[Floats, dict[str, Floats]]:
+def _slot_directions(polygon: Polygon, corner: Corner) -> tuple[Floats, dict[str, Floats]]:
     """Finds the vertex, and vectors along which a slot may be asked to point."""
     points = np.asarray(polygon.exterior.coords)[:-1]
     mouth = points[corner.vertex]
@@ -174,7 +174,7 @@ def _directions(
     polygon: Polygon, corner: Corner, settings: Fabrication, turns: Floats
 ) -> tuple[Floats, Floats]:
     """Finds the vertex, and unit vectors (n, 2) turned from the preferred direction."""
-    mouth, ways = _ways(polygon, corner)
+    mouth, ways = _slot_directions(polygon, corner)
     way = ways["ligament" if corner.turn is not None else settings.slots.direction]
     return mouth, _turned(way / np.linalg.norm(way), turns)
 

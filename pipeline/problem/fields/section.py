@@ -31,7 +31,7 @@ class Section(BaseModel):
         """Adds to the schema the meaning of every key by the docstring."""
         made = handler(core_schema)
         whole = handler.resolve_ref_schema(made)
-        whole["description"] = _lead(cls)
+        whole["description"] = _summary(cls)
         told = _meanings(cls)
         for name, field in cls.model_fields.items():
             if (key := field.alias or name) in whole["properties"] and name in told:
@@ -70,7 +70,7 @@ def _is_internal(field: FieldInfo) -> bool:
     return any(isinstance(each, SkipJsonSchema) for each in field.metadata)  # type: ignore[misc]
 
 
-def _lead(section: type) -> str:
+def _summary(section: type) -> str:
     """Takes the text before the attributes from a docstring, a line for each paragraph."""
     told = _ATTRIBUTES.split(inspect.cleandoc(section.__doc__ or ""))[0]
     return "\n\n".join(map(_on_one_line, told.split("\n\n")))

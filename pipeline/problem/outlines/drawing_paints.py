@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pipeline.problem.outlines.painted_areas import filled_area, pieces_of, wound_outlines
+from pipeline.problem.outlines.painted_areas import filled_area, nonzero_outlines, pieces_of
 from pipeline.runtime import UserError
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def is_filled(shape: Shape) -> bool:
     return _paints(shape, "fill")
 
 
-def is_wound(shape: Shape) -> bool:
+def fills_nonzero(shape: Shape) -> bool:
     """Tells a fill of all that its outline winds round, whichever way and how often."""
     return is_filled(shape) and not _is_even_odd(shape, "fill-rule")
 
@@ -130,7 +130,7 @@ def _cuts_off(drawing: SVG, shape: SvgPath, name: str, frame: str) -> bool:
         return True
     if any(each.values.get("clip-path", "none") != "none" for each in (clip, *clip)):
         return True
-    area = filled_area(wound_outlines(pieces_of(shape, _CHORDS)))
+    area = filled_area(nonzero_outlines(pieces_of(shape, _CHORDS)))
     return bool((area - _clip_area(drawing, clip, frame)).area > _LOST * area.area)
 
 
@@ -147,7 +147,7 @@ def _clip_area(drawing: SVG, clip: ClipPath, frame: str) -> Geometry:
         if isinstance(each, Shape):
             pieces = pieces_of((Curve(each) * moved).reify(), _CHORDS)
             even_odd = _is_even_odd(each, "clip-rule")
-            areas.append(filled_area(pieces if even_odd else wound_outlines(pieces)))
+            areas.append(filled_area(pieces if even_odd else nonzero_outlines(pieces)))
     return shapely.union_all(areas)
 
 

@@ -16,16 +16,16 @@ from pipeline.problem.outlines.drawing_paints import (
     check_clips,
     check_paints,
     check_pictures,
+    fills_nonzero,
     grey,
     is_filled,
     is_seen,
-    is_wound,
 )
 from pipeline.problem.outlines.painted_areas import (
     Painted,
+    nonzero_outlines,
     painted_outlines,
     pieces_of,
-    wound_outlines,
 )
 from pipeline.problem.outlines.plane import Outline, extents
 from pipeline.runtime import UserError, read_bounded
@@ -167,7 +167,7 @@ def _of_drawing(path: Path, threshold: float | None, invert: bool) -> list[NDArr
             raise ValueError(f"it has points further than {FARTHEST:g} from its origin")
         check_clips(read)
         filled = [
-            wound_outlines(pieces) if is_wound(each) else pieces
+            nonzero_outlines(pieces) if fills_nonzero(each) else pieces
             for each, pieces in zip(paths, drawn, strict=True)
         ]
     # an XML parse error is a SyntaxError; a radius or a scale of 1e-300 divides by zero

@@ -96,7 +96,7 @@ def filled_area(pieces: list[NDArray[Any]]) -> Geometry:
     return shapely.make_valid(shapely.MultiPolygon([shapely.Polygon(each) for each in pieces]))
 
 
-def wound_outlines(pieces: list[NDArray[Any]]) -> list[NDArray[Any]]:
+def nonzero_outlines(pieces: list[NDArray[Any]]) -> list[NDArray[Any]]:
     """Lists outlines, an odd number round each point in the area that the pieces wind round.
 
     They are the pieces themselves where either rule, nonzero or even-odd, fills the same.

@@ -68,14 +68,14 @@ def drive_is_free(problem: Problem) -> Findings:
                 what = f"unit {problem.lattice.name(both[0])} is driven and clamped"
                 yield ProblemFault(what, (*keys, "units"), "drive or clamp it, not both")
         for units, other in others:
-            if (both := sorted(driven & units)) and (dof := _contested(drive, other)):
+            if (both := sorted(driven & units)) and (dof := _shared_dof(drive, other)):
                 what = f"unit {problem.lattice.name(both[0])} is driven twice, along {dof}"
                 remedy = "give every unit to one drive, or let the others' way be `free`"
                 yield ProblemFault(what, (*keys, "units"), remedy)
         others.append((driven, drive))
 
 
-def _contested(one: SingleDrive, other: SingleDrive) -> str | None:
+def _shared_dof(one: SingleDrive, other: SingleDrive) -> str | None:
     """Names a degree of freedom that one of two drives moves and the other does not leave free."""
     held = [{"ux", "uy", "theta"} - set(drive.free) for drive in (one, other)]
     moved = [set(drive.acting) for drive in (one, other)]

@@ -48,7 +48,7 @@ def regions(problem: Problem) -> Findings:
         yield from (*_cloak(problem), *_interest(problem))
 
 
-def _elsewhere(problem: Problem) -> str:
+def _remedy(problem: Problem) -> str:
     return f"enlarge it, or move its centre: {_sites_range(problem)}"
 
 
@@ -62,7 +62,7 @@ def _cloak(problem: Problem) -> Findings:
     yield from _region_fits(problem, problem.cloak, ("cloak",))
     if not cloak_units(problem):
         what = "no unit lies in the cloak (driven units and the region of interest are left out)"
-        yield ProblemFault(what, ("cloak",), _elsewhere(problem))
+        yield ProblemFault(what, ("cloak",), _remedy(problem))
 
 
 def _interest(problem: Problem) -> Findings:
@@ -79,7 +79,7 @@ def _interest(problem: Problem) -> Findings:
     if problem.objective.region == "surroundings":
         yield ProblemFault(what, ("cloak",), "leave units outside it")
     else:
-        yield ProblemFault(what, ("objective", "region"), _elsewhere(problem))
+        yield ProblemFault(what, ("objective", "region"), _remedy(problem))
 
 
 def _is_decided(problem: Problem, looked_at: set[int]) -> bool:
@@ -95,7 +95,7 @@ def void(problem: Problem) -> Findings:
         return
     removed = void_units(problem)
     if not removed:
-        yield ProblemFault("no unit lies in the void", ("void",), _elsewhere(problem))
+        yield ProblemFault("no unit lies in the void", ("void",), _remedy(problem))
     yield from _void_and_supports(problem, set(removed))
     yield from _void_and_rest(problem, set(removed))
 
@@ -107,7 +107,7 @@ def inclusion(problem: Problem) -> Findings:
     stiff = set(inclusion_units(problem))
     if not stiff:
         what = "no unit lies in the inclusion"
-        yield ProblemFault(what, ("inclusion", "region"), _elsewhere(problem))
+        yield ProblemFault(what, ("inclusion", "region"), _remedy(problem))
     if both := sorted(stiff & set(void_units(problem))):
         what = f"unit {problem.lattice.name(both[0])} is in the void and in the inclusion"
         yield ProblemFault(what, ("inclusion", "region"), "keep the two apart")

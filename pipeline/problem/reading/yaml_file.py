@@ -122,7 +122,7 @@ def read_yaml(path: Path) -> Document:
     return Document(path, data, dict(_lines(node, ())))
 
 
-def skim_yaml(path: Path) -> dict[str, Any]:
+def read_quickly(path: Path) -> dict[str, Any]:
     """Reads the mapping in a YAML file fast; an empty one where `read` would refuse it."""
     try:
         text = _text(path)

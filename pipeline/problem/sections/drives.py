@@ -253,7 +253,7 @@ class _Course(Section):
         return self.frequency is None and self.width is None
 
     @model_validator(mode="after")
-    def _one_course(self) -> Self:
+    def _check_course(self) -> Self:
         if self.frequency is not None and self.width is not None:
             raise fault("frequency and width exclude each other", "give one of them", "width")
         if self.rise_time is not None and self.frequency is None:

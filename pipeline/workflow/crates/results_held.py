@@ -30,7 +30,7 @@ def leftovers(study: studies.Study, built: Path) -> list[Path]:
     present = [*built.glob("*.nc"), *built.glob("recordings/*/comparison.nc")]
     for path in sorted({*shown, *present}):
         made = datasets.read_attributes(path)
-        if made.get("problem_hash") == _wanted_hash(study, path.stem, str(made.get("kind"))):
+        if made.get("problem_hash") == _expected_hash(study, path.stem, str(made.get("kind"))):
             continue
         if path in shown:
             what = "it was made from another problem than the study's"
@@ -44,7 +44,7 @@ def leftovers(study: studies.Study, built: Path) -> list[Path]:
     return [path for path in found if path.exists()]
 
 
-def _wanted_hash(study: studies.Study, name: str, kind: str) -> str | None:
+def _expected_hash(study: studies.Study, name: str, kind: str) -> str | None:
     """Hashes what a dataset of this name depends on; None if the study has none of the name."""
     asked = studies.problem_of(study)
     if (method := name.removeprefix("design_")) != name:

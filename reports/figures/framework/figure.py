@@ -70,21 +70,21 @@ def _problem(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
     altered = style.place(figure, 61.0, top, SIDE, SIDE)
     domain_panels.excitation(altered, initial, spacing, study.scene.radii[-1])
     for left, name, colour in ((0.0, "Reference", style.INTACT), (61.0, "Altered", style.ALTERED)):
-        _say(figure, left + SIDE / 2, top - 1.2, name, color=colour, va="bottom")
+        _write(figure, left + SIDE / 2, top - 1.2, name, color=colour, va="bottom")
     notes = (
         (SIDE / 2, r"$\mathbf{u}^\mathrm{R}(\mathbf{x},t)$"),
         (61.0 + SIDE / 2, r"$\mathbf{u}^\mathrm{C}_{\boldsymbol{\xi}}(\mathbf{x},t)$"),
     )
     for x, text in notes:
-        _say(figure, x, top + SIDE + 0.5, text.replace("boldsymbol", "mathbf"), va="top")
+        _write(figure, x, top + SIDE + 0.5, text.replace("boldsymbol", "mathbf"), va="top")
     _arrow(figure, (45.5, top + SIDE / 2), (58.5, top + SIDE / 2), kind="<|-|>")
-    _say(figure, 52.0, top + SIDE / 2 - 2.0, "alike in the\nregion of\ninterest", va="bottom")
+    _write(figure, 52.0, top + SIDE / 2 - 2.0, "alike in the\nregion of\ninterest", va="bottom")
     for k, (tint, text) in enumerate(
         ((domain_panels.INTEREST_TINT, "region of interest"), (CLOAK_TINT, "cloak"))
     ):
         y = top + SIDE / 2 + 4.0 + 10.5 * k
         _box(figure, (49.5, y, 5.0, 2.6), tint)
-        _say(figure, 52.0, y + 3.0, text.replace(" of ", "\nof ") if k == 0 else text, va="top")
+        _write(figure, 52.0, y + 3.0, text.replace(" of ", "\nof ") if k == 0 else text, va="top")
 
 
 def _loop(figure: Figure, design: xr.Dataset) -> None:
@@ -95,17 +95,17 @@ def _loop(figure: Figure, design: xr.Dataset) -> None:
         r"$\min_{\xi\in D}\ J(\xi)=\int_t\int_{\Omega_\mathrm{ROI}}"
         r" g(\mathbf{u}^\mathrm{R},\mathbf{u}^\mathrm{C}_\xi)\,\mathrm{d}\mathbf{x}\,\mathrm{d}t$"
     )
-    _say(figure, left + wide / 2, 14.0, formula, fontsize=style.TITLE)
+    _write(figure, left + wide / 2, 14.0, formula, fontsize=style.TITLE)
     steps = ("simulate", r"$\mathrm{d}J/\mathrm{d}\xi$", r"update $\xi$")
     for k, text in enumerate(steps):
         x = left + 3.0 + 20.5 * k
         _box(figure, (x, 19.0, 17.0, 6.5), "white", edge=style.CLOAKED)
-        _say(figure, x + 8.5, 22.25, text)
+        _write(figure, x + 8.5, 22.25, text)
         if k:
             _arrow(figure, (x - 3.3, 22.25), (x - 0.2, 22.25))
     right = left + 3.0 + 41.0 + 8.5
     _arrow(figure, (right, 25.7), (left + 11.5, 25.7), bend=-0.22)
-    _say(figure, left + wide / 2, 33.2, "until it falls no more", color=style.GREY)
+    _write(figure, left + wide / 2, 33.2, "until it falls no more", color=style.GREY)
     axes = style.place(figure, left + 11.0, 37.0, wide - 15.0, 12.0)
     for method in design["method"].values:
         history = design.sel({"method": method})
@@ -139,7 +139,7 @@ def _kinds(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
     second = style.place(figure, 122.0, SECOND + 7.0, SMALL + 12.0, SMALL)
     domain_panels.inclusion(second, initial, spacing, radius)
     for x, text in ((70.0 + SMALL / 2, "excitation"), (128.0 + SMALL / 2, "inclusion under load")):
-        _say(figure, x, SECOND + 7.0 + SMALL + 0.3, text, va="top")
+        _write(figure, x, SECOND + 7.0 + SMALL + 0.3, text, va="top")
 
 
 def _making(figure: Figure, study: StudyResults, cloaked: RigidUnits) -> None:
@@ -158,11 +158,13 @@ def _making(figure: Figure, study: StudyResults, cloaked: RigidUnits) -> None:
     domain_panels.filmed(third, cloaked, peak, window)
     names = ("optimised cloak", "units and shims, cut", "filmed and tracked")
     for left, text in zip(lefts, names, strict=False):
-        _say(figure, left + SMALL / 2, top + SMALL + 0.6, text, va="top")
+        _write(figure, left + SMALL / 2, top + SMALL + 0.6, text, va="top")
     for left, right in ((35.5, 43.0), (80.0, 87.5), (124.5, 131.0)):
         _arrow(figure, (left, top + SMALL / 2), (right, top + SMALL / 2))
     _compared(figure, study, (lefts[3], top + 2.0))
-    _say(figure, lefts[3] + SMALL / 2, top + SMALL + 0.6, "compared with the simulation", va="top")
+    _write(
+        figure, lefts[3] + SMALL / 2, top + SMALL + 0.6, "compared with the simulation", va="top"
+    )
 
 
 def _compared(figure: Figure, study: StudyResults, at: tuple[float, float]) -> None:
@@ -186,7 +188,7 @@ def _compared(figure: Figure, study: StudyResults, at: tuple[float, float]) -> N
     scale_wide_numbers(axes)
 
 
-def _say(figure: Figure, x: float, y: float, text: str, **told: str | float) -> None:
+def _write(figure: Figure, x: float, y: float, text: str, **told: str | float) -> None:
     settings: dict[str, str | float] = {"ha": "center", "va": "center", "fontsize": style.TEXT}
     style.write(figure, x, y, text, multialignment="center", **(settings | told))
 

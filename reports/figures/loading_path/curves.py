@@ -20,7 +20,7 @@ from reports.figures.loading_path.abscissa import (
     structures,
 )
 from reports.figures.loading_path.drive_response import drive_response
-from reports.figures.loading_path.load_legend import curve_look
+from reports.figures.loading_path.load_legend import curve_style
 from reports.figures.loading_path.measures import Measure, over_cases
 from reports.panels import measured_overlay
 from reports.study import RedesignResults, StudyResults, display_name
@@ -67,8 +67,8 @@ def structure_curves(
         for number, load in enumerate(loads):
             label = title if len(loads) == 1 else f"{title}, {load}"
             curve = values.sel(structure=name).isel(case=number)
-            look = curve_look(name, number)
-            axes.plot(path.values, curve, label=label, zorder=order, **look)
+            line = curve_style(name, number)
+            axes.plot(path.values, curve, label=label, zorder=order, **line)
 
 
 def measure_panel(

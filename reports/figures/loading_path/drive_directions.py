@@ -20,16 +20,16 @@ def drive_directions(
     """
     if not isinstance(drive, TimeSeriesDrive):
         return tuple(getattr(drive, "directions", ()))
-    found = main_direction(_course(response, units))
+    found = main_direction(_history(response, units))
     return () if found is None else (found,)
 
 
 def swings(drive: SingleDrive, response: xr.Dataset, units: Sequence[int]) -> bool:
     """Tests if a drive is a measured motion that goes to both sides of where it starts."""
-    return isinstance(drive, TimeSeriesDrive) and swings_back(_course(response, units))
+    return isinstance(drive, TimeSeriesDrive) and swings_back(_history(response, units))
 
 
-def _course(response: xr.Dataset, units: Sequence[int]) -> Floats:
+def _history(response: xr.Dataset, units: Sequence[int]) -> Floats:
     """Returns the displacement (n_times, 2) of the first unit of a drive, mm."""
     moved = response["displacement"].isel(structure=0, case=0, unit=units[0])
     return np.asarray(moved.sel(dof=["ux", "uy"]).transpose("time", "dof").values)

@@ -23,7 +23,7 @@ _LINE, _HANDLE, _LETTER = 3.4, 6.5, 1.1
 """Of a legend, mm: height of a line, room of a handle, mean width of a letter."""
 
 
-def curve_look(structure: str, case: int) -> dict[str, Any]:
+def curve_style(structure: str, case: int) -> dict[str, Any]:
     """Returns colour, width and dashes of a structure's curve under a load case."""
     dashes, white = CASE_STYLES[case % len(CASE_STYLES)]
     colour = style.tinted(style.STRUCTURE_COLOURS[structure], white)
@@ -52,7 +52,7 @@ class LoadLegend:
         by_load = _lines(len(shown), len(loads), most) <= _lines(len(loads), len(shown), most)
         pairs = [(k, case) for case in range(len(loads)) for k in range(len(shown))]
         entries = [
-            Line2D([], [], label=f"{titles[k]}, {loads[case]}", **curve_look(shown[k], case))
+            Line2D([], [], label=f"{titles[k]}, {loads[case]}", **curve_style(shown[k], case))
             for k, case in (pairs if by_load else sorted(pairs))
         ]
         lines = _lines(*((len(shown), len(loads)) if by_load else (len(loads), len(shown))), most)

@@ -36,7 +36,7 @@ def draw_optimisers(scenes: Mapping[str, xr.Dataset]) -> Figure:
         for column, (along, what, label) in enumerate(_AXES):
             left, top = 14.0 + 57.0 * column, 9.0 + row * _ROW
             axes = style.place(figure, left, top, 43.0, _HIGH)
-            _courses(axes, data, along, what)
+            _draw_histories(axes, data, along, what)
             axes.set(xlabel=along, ylabel=label, yscale="log")
         style.letter(figure, 2.0, 1.0 + row * _ROW, "abcdefgh"[row], name)
     top = len(scenes) * _ROW
@@ -51,7 +51,7 @@ def draw_optimisers(scenes: Mapping[str, xr.Dataset]) -> Figure:
     return figure
 
 
-def _courses(axes: Axes, data: xr.Dataset, along: str, what: str) -> None:
+def _draw_histories(axes: Axes, data: xr.Dataset, along: str, what: str) -> None:
     first = float(data["loss"].isel(evaluation=0).max())
     for name in data["optimiser"].values:
         course = data.sel(optimiser=name)

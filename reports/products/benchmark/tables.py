@@ -12,7 +12,7 @@ from reports.base import Table
 def table(name: str, data: xr.Dataset) -> Table:
     """Returns every point of a benchmark, or every optimiser of a contest."""
     if "optimiser" in data.dims:
-        return _contest(name, data)
+        return _optimiser_table(name, data)
     if "video" in data.dims:
         return _tracking(name, data)
     columns = {column: values.to_numpy() for column, values in points(data).items()}
@@ -37,7 +37,7 @@ def _tracking(name: str, data: xr.Dataset) -> Table:
     return Table(f"{name}.csv", "every video", {k: v.to_numpy() for k, v in columns.items()})
 
 
-def _contest(name: str, data: xr.Dataset) -> Table:
+def _optimiser_table(name: str, data: xr.Dataset) -> Table:
     evaluated = np.isfinite(data["cpu_time"].to_numpy())
     last = np.maximum(evaluated.sum(axis=1) - 1, 0)
     rows = np.arange(len(last))

@@ -60,7 +60,7 @@ def report(args: argparse.Namespace) -> None:
         {path.name: provenance.file_hash(path) for path in files},
         others={"certificate": data},
     )
-    if not claims.judged(worst.target, []):  # claims are on designs in their own right
+    if not claims.assessed(worst.target, []):  # claims are on designs in their own right
         reduced = draft.reasons(asked, problem.load(args.problem))
         worst = replace(worst, draft=tuple(reduced))
     publish(certificate_report(CertifiedDesign(data, worst)), args.out_dir)

@@ -69,7 +69,7 @@ def tables(built: Sequence[BuiltReport]) -> list[dict[str, Any]]:
     made: list[dict[str, Any]] = []
     for name in dict.fromkeys(claim.study for claim in claims.listed().claims):
         own = by_name.get(name)
-        judged = claims.judged(name, own.facts if own else [])
+        judged = claims.assessed(name, own.facts if own else [])
         label = own.label if own else ""
         made.append(
             {

@@ -86,7 +86,7 @@ def reports(results: Path, faults: list[UserError] | None = None) -> list[BuiltR
     told = [] if faults is None else faults
     found: list[BuiltReport] = []
     for page in sorted(results.glob("*/report/index.html")):
-        found += _sound([page], lambda page: _built(page, results, told), told)
+        found += _readable([page], lambda page: _built(page, results, told), told)
     return sorted(found, key=lambda built: (not built.figure, built.draft, built.name))
 
 
@@ -96,7 +96,7 @@ def others(results: Path, folder: str, pattern: str) -> list[Link]:
     return [Link(_seen(path, results), path.name) for path in paths]
 
 
-def _sound(files: Iterable[Path], read: Callable[[Path], T], faults: list[UserError]) -> list[T]:
+def _readable(files: Iterable[Path], read: Callable[[Path], T], faults: list[UserError]) -> list[T]:
     """Reads files, and appends to ``faults`` why some cannot be."""
     found = []
     for file in files:
@@ -126,14 +126,14 @@ def _built(page: Path, results: Path, faults: list[UserError]) -> BuiltReport:
         picture=page.parent / f"{name.partition('@')[0]}.png",
         facts=[
             fact
-            for each in _sound([known] if known.is_file() else [], _facts(sealed), faults)
+            for each in _readable([known] if known.is_file() else [], _facts(sealed), faults)
             for fact in each
         ],
         files=[
             *(Link(_seen(file, results), file.name) for file in sorted(page.parent.glob("*.pdf"))),
             *(link for folder in folders for link in _around(folder, results, faults)),
         ],
-        datasets=_sound(shown, lambda file: _dataset(file, results), faults),
+        datasets=_readable(shown, lambda file: _dataset(file, results), faults),
     )
 
 
@@ -162,7 +162,7 @@ def _around(folder: Path, results: Path, faults: list[UserError]) -> list[Link]:
         if (page := folder / product / "index.html").is_file()
     ]
     pages = sorted(folder.glob("recordings/*/index.html"))
-    return found + _sound(pages, lambda page: _recording(page, results), faults)
+    return found + _readable(pages, lambda page: _recording(page, results), faults)
 
 
 def _recording(page: Path, results: Path) -> Link:

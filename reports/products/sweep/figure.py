@@ -60,7 +60,7 @@ def draw_sweep(data: xr.Dataset, sweep: Sweep) -> Figure:
     if cases.mapped(sweep):
         return _maps(data, along, shown)
     figure = style.page(_TOP + len(along) * _ROW)
-    look = _look(data.sizes["case"], joined=(joined := cases.ordered(sweep)))
+    look = _marker_style(data.sizes["case"], joined=(joined := cases.ordered(sweep)))
     _titles(figure, shown, look)
     for row, axis in enumerate(along):
         for column, measure in enumerate(shown):
@@ -70,7 +70,7 @@ def draw_sweep(data: xr.Dataset, sweep: Sweep) -> Figure:
     return figure
 
 
-def _look(count: int, *, joined: bool) -> dict[str, Any]:
+def _marker_style(count: int, *, joined: bool) -> dict[str, Any]:
     """Returns how so many points are drawn: the fewer of them, the larger and the darker."""
     size = float(np.clip(_INK / np.sqrt(count), *_SIZES))
     look: dict[str, Any] = {"markersize": size, "alpha": 0.5 if count > _SPARSE else 0.9, "ls": ""}

@@ -50,7 +50,7 @@ def draw_quality(track: xr.Dataset, found: TrackQuality, load_axis: str) -> Figu
         bar = style.place(drawn, left + _SIZE - 3.0, _TOP + 12.0, 1.8, _SIZE - 24.0)
         drawn.colorbar(shown, cax=bar)
     _arrows(drawn.axes[0], specimen, residual)
-    _courses(drawn, track, found, place, _axis(track, load_axis))
+    _draw_trajectories(drawn, track, found, place, _axis(track, load_axis))
     return drawn
 
 
@@ -95,7 +95,7 @@ def _axis(track: xr.Dataset, load_axis: str) -> tuple[np.ndarray, str]:
     return moved @ direction, "displacement of the driven units, mm"
 
 
-def _courses(
+def _draw_trajectories(
     drawn: Figure,
     track: xr.Dataset,
     found: TrackQuality,

@@ -87,7 +87,7 @@ def images(painted: Painter, frames: Iterable[Frame]) -> Iterator[Image]:
         size = [side * painted.scale for side in painted.camera.size]
         big = np.asarray(cv2.resize(frame.image, size), np.uint8)
         drawn = _units(painted, np.repeat(big[..., None], 3, axis=2), index, last)
-        yield np.vstack([drawn, _told(painted, legend, frame, int(lost.sum()))])
+        yield np.vstack([drawn, _with_status(painted, legend, frame, int(lost.sum()))])
 
 
 def _palette(colours: Colormap) -> NDArray[np.uint8]:
@@ -171,7 +171,7 @@ def _legend(painted: Painter) -> Image:
     return band
 
 
-def _told(painted: Painter, legend: Image, frame: Frame, lost: int) -> Image:
+def _with_status(painted: Painter, legend: Image, frame: Frame, lost: int) -> Image:
     band = legend.copy()
     words = [f"frame {frame.index}", f"{frame.time:.3f} s", f"{lost} lost", painted.note]
     text = "   ".join(word for word in words if word)

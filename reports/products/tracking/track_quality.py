@@ -66,7 +66,7 @@ def measured(track: xr.Dataset, images: Iterable[Image], stream: StreamPropertie
     specimen = of_track(track)
     pixel = pixel_size(track)
     scale = np.array([1 / pixel, 1 / pixel, 180 / np.pi])
-    resting = _resting(pose, sigma)
+    resting = _rest_length(pose, sigma)
     timing = track["timing"].values
     interval, rate = np.diff(track["time"].values), frame_rate(track)
     steps = np.linalg.norm(np.diff(pose[..., :2], axis=0), axis=-1) / pixel
@@ -134,7 +134,7 @@ def _spacing(centre: Floats) -> float:
     return float(np.median(apart.min(axis=1)))
 
 
-def _resting(pose: Floats, sigma: Floats) -> int:
+def _rest_length(pose: Floats, sigma: Floats) -> int:
     """Returns length of the run of frames in the beginning that show no motion."""
     square = (pose / np.maximum(sigma, 1e-12)) ** 2
     with np.errstate(invalid="ignore"):  # nothing is seen in some frames

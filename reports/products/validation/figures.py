@@ -124,7 +124,7 @@ def draw_cycles(made: xr.Dataset) -> Figure:
             drawn, left - 10.0, top + 1.0, style.numbered_letter(k), str(made["title"].values[k])
         )
         axes = style.place(drawn, left, top + 8.0, 72.0, 40.0)
-        seen = _draw_ways(axes, made, k)
+        seen = _draw_paths(axes, made, k)
         snaps = made["record_of_snap"].values == k
         for end, force in (("snap_start", "snap_peak"), ("snap_end", "snap_rest")):
             named = "ends of a snap" if end == "snap_start" and snaps.any() else None
@@ -138,7 +138,7 @@ def draw_cycles(made: xr.Dataset) -> Figure:
     return drawn
 
 
-def _draw_ways(axes: Axes, made: xr.Dataset, record: int) -> Floats:
+def _draw_paths(axes: Axes, made: xr.Dataset, record: int) -> Floats:
     """Draws force over displacement of a record and its equilibria; returns the measured force."""
     mine, role = made["record_of_point"].values == record, made["role"].values
     for name, number in TABLES["load_cycles"]["role"].flags.items():
@@ -161,7 +161,7 @@ def _enlarge_trace(axes: Axes, made: xr.Dataset, record: int) -> None:
     if not on_it.any():
         return
     inset = axes.inset_axes((0.12, 0.7, 0.38, 0.3))
-    _draw_ways(inset, made, record)
+    _draw_paths(inset, made, record)
     for name, limit in (("displacement", inset.set_xlim), ("force", inset.set_ylim)):
         ends = made[name].values[on_it].min(), made[name].values[on_it].max()
         limit(1.5 * ends[0] - 0.5 * ends[1], 1.5 * ends[1] - 0.5 * ends[0])

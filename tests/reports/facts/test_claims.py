@@ -32,10 +32,10 @@ def test_our_own_claims_are_on_targets_and_facts_that_there_are() -> None:
         assert claim.study in studies.targets()
         assert claim.fact in known
         assert claims.parsed(claim.number)[0] > 0
-    open_ones = claims.judged("fig2@unbiased", [])
+    open_ones = claims.assessed("fig2@unbiased", [])
     assert {each.simulation.status for each in open_ones} == {"not yet evaluated"}
     assert not claims.quoted(open_ones)
-    assert claims.quoted(claims.judged("fig2", []))
+    assert claims.quoted(claims.assessed("fig2", []))
 
 
 def test_a_claim_is_the_papers_with_its_line_or_our_own() -> None:
@@ -54,7 +54,7 @@ def test_every_claim_on_a_study_that_can_be_built_has_its_fact(
         "fig4": lambda: along.loading_path_facts(shield),
         "fig5": lambda: along.loading_path_facts(smile),
     }[name]()
-    for judged in claims.judged(name, known):
+    for judged in claims.assessed(name, known):
         assert judged.simulation.status in {"holds", "does not hold"}, judged.claim.fact
 
 
@@ -68,8 +68,8 @@ def test_a_relation_has_its_tolerance(ours: float, relation: claims.Relation, ho
     assert claims.agrees(ours, relation, 5.2, 0.1) is holds
 
 
-def found(*facts: Fact) -> dict[str, claims.JudgedClaim]:
-    return {each.claim.fact: each for each in claims.judged("fig4", facts)}
+def found(*facts: Fact) -> dict[str, claims.AssessedClaim]:
+    return {each.claim.fact: each for each in claims.assessed("fig4", facts)}
 
 
 ROTATION = number("rotation_altered", "mean", 10.5, "deg")
@@ -101,7 +101,7 @@ def test_multiples_of_the_spacing_are_lengths_other_units_refused() -> None:
 
 
 def test_the_verdict_counts_and_bears_the_label() -> None:
-    judged = claims.judged("fig4", [ROTATION])
+    judged = claims.assessed("fig4", [ROTATION])
     assert "in experiment (SYNTHETIC), 0 of 3" in claims.verdict(judged, "SYNTHETIC")
     words = claims.verdict(judged)
     assert words == (
