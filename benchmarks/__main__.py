@@ -68,7 +68,7 @@ def _measured(suite: Suite, args: argparse.Namespace, core: int | None) -> bool:
         return True
     fresh = [one for one in measured if one.method not in limits.skipped]
     made = comparison.record(fresh, about, yard)
-    print(comparison.compared(suite.name, made, skipped=limits.skipped), flush=True)
+    print(comparison.comparison_text(suite.name, made, skipped=limits.skipped), flush=True)
     if args.keep:
         comparison.keep(suite.name, made)
     return not any(one.failure for one in measured)

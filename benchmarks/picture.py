@@ -39,13 +39,13 @@ def figure(measured: dict[str, list[TableRow]]) -> Figure:
     """Draws the time of loss and gradient beside the baselines, and time against error."""
     drawn = Figure(figsize=(style.TWO_COLUMNS / style.MM_PER_INCH, 2.5))
     left, right = drawn.subplots(1, 2, width_ratios=(1, 1.2))
-    _beside(left, measured)
-    _against(right, measured["precision"])
+    _draw_times(left, measured)
+    _draw_errors(right, measured["precision"])
     drawn.tight_layout(w_pad=2.0)
     return drawn
 
 
-def _beside(axes: Axes, measured: dict[str, list[TableRow]]) -> None:
+def _draw_times(axes: Axes, measured: dict[str, list[TableRow]]) -> None:
     rows = [
         (scene, row)
         for scene in ("fig4", "fig2")
@@ -65,7 +65,7 @@ def _beside(axes: Axes, measured: dict[str, list[TableRow]]) -> None:
     axes.set_xlabel("processor time of loss and gradient, s")
 
 
-def _against(axes: Axes, rows: list[TableRow]) -> None:
+def _draw_errors(axes: Axes, rows: list[TableRow]) -> None:
     for kind, colour in (("implicit", style.INTACT), ("explicit", style.METHOD_COLOURS["mma"])):
         chosen = sorted(
             (row for row in rows if row.name.startswith(kind)), key=lambda row: row.time

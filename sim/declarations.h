@@ -92,8 +92,8 @@ typedef struct {
     int64_t n_child;
     int64_t *children;
     int64_t n_children;
-    int64_t *apart;
-    int64_t n_apart;
+    int64_t *parallel;
+    int64_t n_parallel;
     int64_t *panel;
     int64_t n_panel;
     int64_t *update;

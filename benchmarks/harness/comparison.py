@@ -17,7 +17,7 @@ from benchmarks.harness.records import Measurement, quantities
 from pipeline.runtime import ROOT, write_atomically
 
 STORED = ROOT / "tests/data/benchmarks.json"
-WORSE = 1.15
+REGRESSION = 1.15
 """Ratio from which a change is told."""
 ROUNDING = 1e-10
 """Errors below are rounding: how they change tells nothing."""
@@ -32,17 +32,17 @@ def yardstick() -> float:
     square = np.random.default_rng(0).normal(size=(_SIZE, _SIZE))
     matrix = square @ square.T + _SIZE * np.eye(_SIZE)
 
-    def job() -> float:
+    def fixed_job() -> float:
         start = time.process_time()
         for _ in range(5):
             cho_factor(matrix)
         sum(n % 7 for n in range(_LOOPS))
         return time.process_time() - start
 
-    return min(job() for _ in range(_ROUNDS))
+    return min(fixed_job() for _ in range(_ROUNDS))
 
 
-def record(measured: list[Measurement], about: Mapping[str, Any], yard: float) -> Record:
+def record(measured: list[Measurement], about: Mapping[str, Any], yardstick_s: float) -> Record:
     """Collects what is kept of a suite: times in yardsticks, errors, machine and commit.
 
     An error that is no finite number is kept as None.
@@ -51,7 +51,7 @@ def record(measured: list[Measurement], about: Mapping[str, Any], yard: float) -
         **{key: about[key] for key in ("processor", "commit", "date")},
         "candidates": {
             one.name: {
-                "time": one.seconds / yard,
+                "time": one.seconds / yardstick_s,
                 "errors": {
                     name: one.error(name) if np.isfinite(one.error(name)) else None
                     for name in quantities([one])
@@ -63,20 +63,22 @@ def record(measured: list[Measurement], about: Mapping[str, Any], yard: float) -
     }
 
 
-def stored(path: Path = STORED) -> dict[str, Record]:
+def read_records(path: Path = STORED) -> dict[str, Record]:
     """Reads the records kept, by suite."""
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
 def keep(name: str, made: Record, path: Path = STORED) -> None:
     """Stores the record of a suite beside those of the others."""
-    records = dict(sorted({**stored(path), name: made}.items()))
+    records = dict(sorted({**read_records(path), name: made}.items()))
     with write_atomically(path) as aside:
         aside.write_text(json.dumps(records, indent=1) + "\n", encoding="utf-8")
 
 
-def worse(now: Record, before: Mapping[str, Any], skipped: Sequence[str] = ()) -> list[str]:
-    """Lists what got slower or less accurate by more than 15 % or has no figures, a line each."""
+def find_regressions(
+    now: Record, before: Mapping[str, Any], skipped: Sequence[str] = ()
+) -> list[str]:
+    """Lists regressions of time or accuracy by more than 15 %, and missing figures, a line each."""
     lines = []
     for name, known in before["candidates"].items():
         found = now["candidates"].get(name)
@@ -85,13 +87,15 @@ def worse(now: Record, before: Mapping[str, Any], skipped: Sequence[str] = ()) -
         if found is None:
             lines.append(f"{name}: no figures any more")
             continue
-        if found["time"] > WORSE * known["time"]:
+        if found["time"] > REGRESSION * known["time"]:
             lines.append(f"{name}: slower, {found['time'] / known['time']:.2f} times the time")
-        lines += [f"{name}: {line}" for line in _less_accurate(found["errors"], known["errors"])]
+        lines += [
+            f"{name}: {line}" for line in _accuracy_regressions(found["errors"], known["errors"])
+        ]
     return lines
 
 
-def _less_accurate(found: Errors, known: Errors) -> list[str]:
+def _accuracy_regressions(found: Errors, known: Errors) -> list[str]:
     lines = []
     for kind, was in known.items():
         if was is None:
@@ -99,16 +103,20 @@ def _less_accurate(found: Errors, known: Errors) -> list[str]:
         error, least = found.get(kind), max(was, ROUNDING)
         if error is None:
             lines.append(f"{kind} has no figure any more")
-        elif error > WORSE * least:
+        elif error > REGRESSION * least:
             lines.append(f"{kind} less accurate, {error / least:.2f} times the error")
     return lines
 
 
-def compared(name: str, now: Record, path: Path = STORED, skipped: Sequence[str] = ()) -> str:
-    """Tells the comparison with what is stored, but for candidates that were skipped."""
-    before = stored(path).get(name)
+def comparison_text(
+    name: str, now: Record, path: Path = STORED, skipped: Sequence[str] = ()
+) -> str:
+    """Formats the comparison with the stored record, but for candidates that were skipped."""
+    before = read_records(path).get(name)
     if before is None:
         return "  nothing stored to compare with: --keep stores this"
     origin = f"{before['date'][:10]}, {before['processor']}, commit {before['commit'][:10]}"
-    lines = worse(now, before, skipped) or ["nothing got slower or less accurate by more than 15 %"]
+    lines = find_regressions(now, before, skipped) or [
+        "nothing got slower or less accurate by more than 15 %"
+    ]
     return "\n".join(f"  {line} (against {origin})" for line in lines)

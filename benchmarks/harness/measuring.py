@@ -53,7 +53,7 @@ def measure_in_turn(
     wanted = result_of(reference)
     with ExitStack() as stack:
         points = {
-            one.name: _Point(one, stack.enter_context(Worker(one.prepare)))
+            one.name: _MeasuredSetting(one, stack.enter_context(Worker(one.prepare)))
             for one in methods
             if one.name not in limits.skipped
         }
@@ -62,7 +62,7 @@ def measure_in_turn(
             point.prepare()
         for round_ in range(limits.repeats):
             for name, point in points.items():
-                if point.wants(round_):
+                if point.runs_in(round_):
                     point.run()
                     tell(f"round {round_ + 1} of {limits.repeats}: {name}: {point.last}")
         measured = {name: point.measurement(wanted, units) for name, point in points.items()}
@@ -79,13 +79,13 @@ def measure_settings(
         with Worker(method.prepare, limits.limit_s) as worker:
             stopped = ""
             for setting, value in method.settings:
-                point = _Point(method, worker, setting, task, (value, task))
+                point = _MeasuredSetting(method, worker, setting, task, (value, task))
                 if stopped:
                     point.failure = stopped
                 else:
                     point.prepare()
                 for round_ in range(limits.repeats):
-                    if point.wants(round_) and point.spent_s < ENOUGH_S:
+                    if point.runs_in(round_) and point.spent_s < ENOUGH_S:
                         point.run()
                 measured.append(point.measurement(reference, units))
                 if not stopped and not worker.alive:
@@ -111,7 +111,7 @@ def in_turn(
     return Suite(name, subject, told, measure, "benchmark", targets, True, short, baselines)
 
 
-class _Point:
+class _MeasuredSetting:
     """Measures a method at a setting; the arguments go to the worker to prepare it."""
 
     def __init__(
@@ -135,7 +135,7 @@ class _Point:
 
     @property
     def last(self) -> str:
-        """Tells the result of the last run."""
+        """Returns the result of the last run."""
         return self.failure or f"{self._runs[-1].cpu_s:.3g} s"
 
     def prepare(self) -> None:
@@ -145,8 +145,8 @@ class _Point:
         except CandidateError as failed:
             self.failure = str(failed)
 
-    def wants(self, round_: int) -> bool:
-        """Tells whether it runs in that round."""
+    def runs_in(self, round_: int) -> bool:
+        """Tests whether it runs in that round."""
         most = self._method.repeats if self._method.timed else 1
         return not self.failure and (most is None or round_ < most)
 

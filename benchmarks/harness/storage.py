@@ -25,7 +25,7 @@ SOURCES = ("sim", "benchmarks", "pipeline", "experiments")
 
 
 def machine(core: int | None = None) -> dict[str, Any]:
-    """Tells where and when this is measured, from which sources; the core if bound to one."""
+    """Records where and when this is measured, from which sources; the core if bound to one."""
     return {
         "processor": _processor(),
         "core": core,
@@ -34,12 +34,12 @@ def machine(core: int | None = None) -> dict[str, Any]:
         "system": platform.platform(),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "commit": git_commit(),
-        "changed_since_commit": _changed(),
+        "changed_since_commit": _changed_sources(),
         "packages": dict(package_versions()),
     }
 
 
-def _changed() -> list[str]:
+def _changed_sources() -> list[str]:
     """Lists source files that are not as the commit has them; empty outside a git checkout."""
     command = ["git", "-C", str(ROOT), "status", "--porcelain", "--", *SOURCES]
     done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
@@ -125,20 +125,20 @@ def stored_measurements(path: Path, names: Sequence[str]) -> dict[str, Measureme
                 note=note if "NOT measured" in note else "; ".join(filter(None, (note, origin))),
                 units=int(point["units"]),
                 compile_s=float(point["compile_time"]),
-                cpu_s=_known(point["cpu_time"]),
-                wall_s=_known(point["wall_time"]),
-                errors=_named(point["error"]),
-                work={name: int(count) for name, count in _named(point["count"]).items()},
+                cpu_s=_known_runs(point["cpu_time"]),
+                wall_s=_known_runs(point["wall_time"]),
+                errors=_name_values(point["error"]),
+                work={name: int(count) for name, count in _name_values(point["count"]).items()},
                 peak_mib=float(point["memory"]) / 2**20,
             )
     return found
 
 
-def _known(runs: xr.DataArray) -> tuple[float, ...]:
+def _known_runs(runs: xr.DataArray) -> tuple[float, ...]:
     return tuple(runs.values[np.isfinite(runs.values)].tolist())
 
 
-def _named(values: xr.DataArray) -> dict[str, float]:
+def _name_values(values: xr.DataArray) -> dict[str, float]:
     (dim,) = values.dims
     pairs = zip(values[dim].values, values.values, strict=True)
     return {str(name): float(value) for name, value in pairs if np.isfinite(value)}

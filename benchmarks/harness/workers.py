@@ -91,7 +91,7 @@ class Worker:
 
     @property
     def alive(self) -> bool:
-        """Tells whether it may be asked for more."""
+        """Tests whether it may be asked for more."""
         return self._process.is_alive()
 
     def peak_mib(self) -> float:

@@ -76,23 +76,23 @@ def _prepare(name: str, method: Callable[..., Floats], tolerance: float, _: Task
 
     def run() -> Sample:
         balance = EquilibriumProblem(posed)
-        motion = _path(posed, partial(method, balance, tolerance))
+        motion = _follow_path(posed, partial(method, balance, tolerance))
         return Sample(posed.results(*posed.measured(motion, posed.values)), balance.work)
 
     return run
 
 
-def _path(posed: LoadCase, solve: partial[Floats]) -> Floats:
+def _follow_path(posed: LoadCase, solve: partial[Floats]) -> Floats:
     """Follows the states (1, n_times, n_units, 3) along the loads; cuts increments that fail."""
     (drive,), top = posed.scene.loads.cases, posed.scene.topology
     held = drive.values(top.held, np.concatenate([[0.0], posed.times]))
     states = [np.zeros(top.n_dofs)]
     for before, after in pairwise(held):
-        states.append(_between(states[-1], before, after, top.held, solve))
+        states.append(_follow_increment(states[-1], before, after, top.held, solve))
     return np.stack(states[1:]).reshape(1, len(posed.times), -1, 3)
 
 
-def _between(
+def _follow_increment(
     state: Floats, before: Floats, after: Floats, held: Ints, solve: partial[Floats]
 ) -> Floats:
     reached, part, cuts = 0.0, 1.0, 0
@@ -152,7 +152,7 @@ def reference(name: str) -> Run:
     )
 
     def run() -> Sample:
-        motion = _path(posed, partial(_newton, balance, TIGHT))
+        motion = _follow_path(posed, partial(_newton, balance, TIGHT))
         measured = jax.value_and_grad(lambda moved: posed.objective(moved, posed.values)[0])
         loss, bar = measured(jnp.asarray(motion))
         pulls = np.zeros_like(motion[0]).reshape(len(posed.times), -1)

@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.harness import aligned
 from benchmarks.stress import families
-from benchmarks.stress.verdicts import StressFamily, Tally, attempted
+from benchmarks.stress.verdicts import StressFamily, Tally, run_attempt
 from pipeline.runtime import write_atomically
 
 ENOUGH = 0.99
@@ -52,17 +52,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     chosen = [family for name, family in FAMILIES.items() if not args.names or name in args.names]
     tallies = [_tally(family, args) for family in chosen]
-    if args.out is not None or _is_whole(args):
+    if args.out is not None or _is_complete(args):
         _store(tallies, args.out or COUNTS)
     else:
-        _tell(f"a part of the suite: {COUNTS} stays as it is; --out stores these counts")
+        _print_line(f"a part of the suite: {COUNTS} stays as it is; --out stores these counts")
     print(table(tallies))
     failures = [line for tally in tallies for line in _failures(tally)]
     print(*failures, sep="\n")
     return 1 if failures and not args.tolerant else 0
 
 
-def _is_whole(args: argparse.Namespace) -> bool:
+def _is_complete(args: argparse.Namespace) -> bool:
     """Tests if no family, case or try is left out."""
     return not (args.names or args.small or args.only) and args.tries >= TRIES
 
@@ -82,14 +82,14 @@ def _tally(family: StressFamily, args: argparse.Namespace) -> Tally:
     )
     for case in islice(family.cases(args.small), *drawn):
         if args.only in case.name:
-            outcomes.append(outcome := attempted(case))
+            outcomes.append(outcome := run_attempt(case))
             if outcome.verdict != "solved":
-                _tell(f"{family.name}: {case.name}: {outcome.verdict}: {outcome.message}")
-    _tell(f"{family.name}: {len(outcomes)} cases, {time.process_time() - start:.0f} s")
+                _print_line(f"{family.name}: {case.name}: {outcome.verdict}: {outcome.message}")
+    _print_line(f"{family.name}: {len(outcomes)} cases, {time.process_time() - start:.0f} s")
     return Tally(family, tuple(outcomes))
 
 
-def _tell(line: str) -> None:
+def _print_line(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
@@ -133,7 +133,7 @@ def _record(tally: Tally) -> dict[str, Any]:
             for name, value, limit, _ in tally.worst
         ],
         "not_solved": [
-            {"case": case.name, "verdict": verdict, "wanted": case.wanted, "message": message}
+            {"case": case.name, "verdict": verdict, "wanted": case.expected, "message": message}
             for case, verdict, message, _ in tally.outcomes
             if verdict != "solved"
         ],

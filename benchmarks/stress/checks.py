@@ -16,10 +16,10 @@ from sim.solvers import Solver, solve_case
 from sim.structure import DistanceContact, clearance, displaced, void_angles
 from sim.time_integration import explicit, implicit
 
-FAR_FROM_BALANCE = 1e-6
+LARGEST_IMBALANCE = 1e-6
 """Largest distance of an equilibrium from the one that the definition has, relative to the largest
 displacement, mm/mm."""
-MOST_TOLERANCES = 50.0
+RESIDUAL_LIMIT = 50.0
 """A stage's own criterion is an estimate from how fast its iteration contracts."""
 ADVICE = "accuracy: tight"
 MOST_STAGES = 24
@@ -48,17 +48,19 @@ def equilibria(case: StressScene, loads: Floats, halving: bool = False) -> list[
     solver = case.solver(loads)
     answer = solved(case, solver)
     checks = [
-        *admissible(case, answer.displacement),
-        *balanced(case, answer),
-        reached(case, answer.displacement, loads),
+        *check_admissible(case, answer.displacement),
+        *check_balance(case, answer),
+        check_held_dofs(case, answer.displacement, loads),
     ]
     if halving:
         finer = solved(case, solver.refined(answer.record))
-        checks.append(Check("change with smaller steps", apart(case, answer, finer), 1e-6))
+        checks.append(
+            Check("change with smaller steps", largest_difference(case, answer, finer), 1e-6)
+        )
     return checks
 
 
-def balanced(case: StressScene, answer: Answer) -> list[Check]:
+def check_balance(case: StressScene, answer: Answer) -> list[Check]:
     """Checks the distance of equilibria from the definition's, and that these are minima."""
     record = answer.record
     assert isinstance(record, static_solver.StaticRecord)
@@ -74,7 +76,7 @@ def balanced(case: StressScene, answer: Answer) -> list[Check]:
         distance = float(np.maximum(distance, _size(case, away) / max(1.0, _size(case, state))))
         negative = max(negative, below)
     return [
-        Check("distance from balance, mm/mm", distance, FAR_FROM_BALANCE),
+        Check("distance from balance, mm/mm", distance, LARGEST_IMBALANCE),
         Check("falling directions of an equilibrium", negative, 0),
     ]
 
@@ -111,19 +113,19 @@ def negative_pivots(factor: spla.SuperLU) -> int:
     return int((factor.U.diagonal() < 0).sum())
 
 
-def reached(case: StressScene, states: Floats, times: Floats) -> Check:
+def check_held_dofs(case: StressScene, states: Floats, times: Floats) -> Check:
     """Checks the distance of the driven units from their motion, mm or rad."""
-    wanted = np.asarray(case.drive.motion(times), dtype=float)
-    wanted = wanted[:, None] if wanted.ndim == 2 else wanted
+    expected = np.asarray(case.drive.motion(times), dtype=float)
+    expected = expected[:, None] if expected.ndim == 2 else expected
     moved = states.reshape(len(states), -1, 3)[:, case.drive.units]
-    return Check("driven units off their motion", float(np.abs(moved - wanted).max()), 1e-9)
+    return Check("driven units off their motion", float(np.abs(moved - expected).max()), 1e-9)
 
 
-def admissible(case: StressScene, states: Floats) -> list[Check]:
+def check_admissible(case: StressScene, states: Floats) -> list[Check]:
     """Checks finite numbers, voids within their barrier, no overlap of units: by geometry."""
     motion = states.reshape(len(states), -1, 3)
     checks = [Check("numbers that are not finite", int((~np.isfinite(states)).sum()), 0)]
-    if not checks[0].kept:
+    if not checks[0].within_limit:
         return checks
     lattice, law = case.scene.lattice, case.scene.structure.contact
     if isinstance(law, DistanceContact):
@@ -131,7 +133,7 @@ def admissible(case: StressScene, states: Floats) -> list[Check]:
         return [*checks, Check("overlapping pairs of units", int(overlaps.max()), 0)]
     if lattice.n_ligaments == 0:
         return checks
-    turned = np.array([case.values.void + _turns(case, state) for state in motion])
+    turned = np.array([case.values.void + _reached_turns(case, state) for state in motion])
     seen = np.array([np.asarray(_void_angles(case, state)) for state in motion])
     off = np.abs((turned - seen + np.pi) % (2 * np.pi) - np.pi).max()
     beyond = np.rad2deg(law.barrier_angle - turned.min())
@@ -142,7 +144,7 @@ def admissible(case: StressScene, states: Floats) -> list[Check]:
     ]
 
 
-def _turns(case: StressScene, state: Floats) -> Floats:
+def _reached_turns(case: StressScene, state: Floats) -> Floats:
     a, b = case.scene.lattice.ligament_units.T
     turn = state[a, 2] - state[b, 2]
     return np.stack([turn, -turn], axis=1)
@@ -169,14 +171,17 @@ def motions(
         asked = np.linspace(0.0, case.scene.loads.duration, asked)
     used = solver or case.solver(asked)
     answer = solved(case, used)
-    checks = [*admissible(case, answer.displacement), reached(case, answer.displacement, asked)]
+    checks = [
+        *check_admissible(case, answer.displacement),
+        check_held_dofs(case, answer.displacement, asked),
+    ]
     if isinstance(answer.record, implicit.ImplicitRecord):
         assert isinstance(used, implicit.ImplicitSolver)
         checks += stages(case, used, answer.record)
     finer = solved(case, used.refined(answer.record))
     return [
         *checks,
-        Check("change with half the steps", typically_apart(case, answer, finer), error, True),
+        Check("change with half the steps", rms_difference(case, answer, finer), error, True),
     ]
 
 
@@ -192,7 +197,7 @@ def motions_as_advised(case: StressScene, asked: Floats | int, error: float) -> 
         if ADVICE not in str(refusal):
             raise
     else:
-        if all(check.kept or not check.stated for check in checks):
+        if all(check.within_limit or not check.stated for check in checks):
             return checks
     return motions(replace(case, scene=case.scene.updated(accuracy="tight")), asked, error)
 
@@ -221,7 +226,7 @@ def stages(
         worst = float(np.maximum(worst, _size(case, step) / max(solver.tolerance * h, 1e-12)))
         negative = max(negative, negative_pivots(factor))
     return [
-        Check("stages off balance, tolerances", worst, MOST_TOLERANCES),
+        Check("stages off balance, tolerances", worst, RESIDUAL_LIMIT),
         Check("falling directions of a stage", negative, 0),
     ]
 
@@ -252,13 +257,13 @@ def _integral(values: Floats, times: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(parts)])
 
 
-def apart(case: StressScene, one: Answer, other: Answer) -> float:
+def largest_difference(case: StressScene, one: Answer, other: Answer) -> float:
     """Returns the largest difference of two answers over the largest displacement."""
     size = max(_size(case, one.displacement), 1e-9)
     return _size(case, one.displacement - other.displacement) / size
 
 
-def typically_apart(case: StressScene, one: Answer, other: Answer) -> float:
+def rms_difference(case: StressScene, one: Answer, other: Answer) -> float:
     """Returns the root mean square difference of two answers over that of the first."""
     scale = case.topology.scale
     off, size = (

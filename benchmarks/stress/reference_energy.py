@@ -75,7 +75,7 @@ def _pair(motions: Array, centroids: Array, corners: Array, law: DistanceLaw) ->
 
 _pairs = jax.jit(jax.vmap(jax.value_and_grad(_pair), (0, 0, 0, None)))
 _pair_blocks = jax.jit(jax.vmap(jax.hessian(_pair), (0, 0, 0, None)))
-ROOM = 64
+PADDING = 64
 """Pairs are evaluated in multiples of so many: JAX compiles for every new number."""
 
 
@@ -87,7 +87,7 @@ def balance(of: ReferenceStructure, state: Floats) -> ReferenceForces:
     total, force = float(np.sum(energy)), np.zeros_like(motion)
     np.subtract.at(force, units, np.asarray(slope))
     if isinstance(of.contact, DistanceContact):
-        pairs, given = _near(of, state)
+        pairs, given = _pairs_in_contact(of, state)
         energy, slope = _pairs(*given)
         total += float(np.sum(np.asarray(energy)[: len(pairs)]))
         np.subtract.at(force, pairs, np.asarray(slope)[: len(pairs)])
@@ -100,7 +100,7 @@ def stiffness(of: ReferenceStructure, state: Floats) -> sp.csc_array:
     units = of.lattice.ligament_units
     blocks = np.asarray(_ligament_blocks(motion[units], of.values, _angles(of)))
     if isinstance(of.contact, DistanceContact):
-        pairs, given = _near(of, state)
+        pairs, given = _pairs_in_contact(of, state)
         units = np.concatenate([units, pairs])
         blocks = np.concatenate([blocks, np.asarray(_pair_blocks(*given))[: len(pairs)]])
     dofs = (3 * units[:, :, None] + np.arange(3)).reshape(-1, 6)
@@ -116,7 +116,7 @@ def _angles(of: ReferenceStructure) -> Floats:
     return np.array([-1e3, -1e3 + 1.0])
 
 
-def _near(
+def _pairs_in_contact(
     of: ReferenceStructure, state: Floats
 ) -> tuple[Ints, tuple[Floats, Floats, Floats, DistanceLaw]]:
     """Finds pairs of units in contact; returns them, and padded as the definition takes them."""
@@ -124,7 +124,7 @@ def _near(
     reach = of.contact.distance
     moved = displaced(of.lattice, of.vertices, state.reshape(1, -1, 3))[0]
     pairs = close_pairs(of.lattice, moved, reach)
-    room = -(-max(len(pairs), 1) // ROOM) * ROOM
+    room = -(-max(len(pairs), 1) // PADDING) * PADDING
     padded = np.concatenate([pairs, np.tile([[0, 1]], (room - len(pairs), 1))])
     length = np.linalg.norm(of.lattice.ligament_vectors, axis=1).mean()
     scale = (reach / length) ** 2

@@ -19,7 +19,7 @@ import yaml
 from sim.core import SimulationError
 
 Verdict = Literal["solved", "refused", "wrong"]
-Wanted = Literal["solution", "either", "refusal"]
+ExpectedVerdict = Literal["solution", "either", "refusal"]
 
 STATED_OVER_TRUE = "stated error over the true one"
 """Names the check whose median and 95 % are told of a family."""
@@ -38,8 +38,8 @@ class Check(NamedTuple):
     stated: bool = False  # whether the result itself tells that number, as an estimate of its error
 
     @property
-    def kept(self) -> bool:
-        """Tells whether the number is within its limit."""
+    def within_limit(self) -> bool:
+        """Tests whether the number is within its limit."""
         return self.value <= self.limit
 
     @property
@@ -57,17 +57,17 @@ class StressCase:
     # a solution, as a study may ask for it and a refusal counts against the solver; a refusal, as
     # there is no answer and any would be wrong; or either, and then an answer may also be one whose
     # own estimate of error says that it is none
-    wanted: Wanted = "solution"
+    expected: ExpectedVerdict = "solution"
 
 
 def attempt(
     name: str,
     check: Callable[..., Sequence[Check]],
     *arguments: Any,  # noqa: ANN401  (of the check)
-    wanted: Wanted = "solution",
+    expected: ExpectedVerdict = "solution",
 ) -> StressCase:
     """Poses an attempt whose check takes arguments."""
-    return StressCase(name, partial(check, *arguments), wanted)
+    return StressCase(name, partial(check, *arguments), expected)
 
 
 class StressOutcome(NamedTuple):
@@ -123,7 +123,7 @@ class Tally:
     @property
     def in_range(self) -> tuple[int, int]:
         """Counts the cases that a study may ask for: tried, and solved."""
-        asked = [outcome for outcome in self.outcomes if outcome.case.wanted == "solution"]
+        asked = [outcome for outcome in self.outcomes if outcome.case.expected == "solution"]
         return len(asked), sum(outcome.verdict == "solved" for outcome in asked)
 
     @property
@@ -150,7 +150,7 @@ class Tally:
         return list(found.values())
 
 
-def attempted(case: StressCase) -> StressOutcome:
+def run_attempt(case: StressCase) -> StressOutcome:
     """Runs a case and gives the verdict."""
     try:
         checks = tuple(case.attempt())
@@ -159,11 +159,11 @@ def attempted(case: StressCase) -> StressOutcome:
     except Exception:  # noqa: BLE001  (whatever else a solver raises is no answer to a user)
         *_, last = traceback.format_exc().strip().splitlines()
         return StressOutcome(case, "wrong", f"raised {last}", ())
-    if case.wanted == "refusal":
+    if case.expected == "refusal":
         return StressOutcome(case, "wrong", "it has no answer, and was given one", checks)
-    missed = [check for check in checks if not check.kept]
+    missed = [check for check in checks if not check.within_limit]
     said = "; ".join(f"{miss.name}: {miss.value:.3g}, limit {miss.limit:.3g}" for miss in missed)
-    if case.wanted == "either" and any(miss.stated for miss in missed):
+    if case.expected == "either" and any(miss.stated for miss in missed):
         return StressOutcome(case, "refused", f"by its own estimate of error: {said}", checks)
     return StressOutcome(case, "wrong" if missed else "solved", said, checks)
 

@@ -26,12 +26,12 @@ from benchmarks.scenes import load_cases
 from benchmarks.suites import fresh_process, warm
 from sim.energy import observe
 from sim.scene import Evaluator, make_plan
-from sim.solvers import Harmonic, LinearRamp, everywhere, solve_cases
+from sim.solvers import Harmonic, LinearRamp, solve_cases, with_full_adjoint
 from sim.time_integration import ImplicitSolver
 
-EXACT = 1e-12
+ROUNDING = 1e-12
 DONE, SKIPPED = "done", "skipped"
-SLOWLY = 20.0
+SLOW_DURATION = 20.0
 """Periods of a static scene's load when its inertia is not left out, s."""
 
 
@@ -51,7 +51,7 @@ def unloaded_reference(name: str, skipped: float, _: Task) -> Run:
     """Compares the region with the unloaded lattice at rest, or with its simulation."""
     posed = load_cases.case(name)
     solver = make_plan(posed.scene).solver
-    still = posed.scene.driven_by(*map(_still, posed.scene.loads.motions))
+    still = posed.scene.driven_by(*map(_with_zero_amplitude, posed.scene.loads.motions))
 
     def simulated() -> Sample:
         rest, *_ = solve_cases(solver, posed.values, still.loads.cases)
@@ -61,7 +61,7 @@ def unloaded_reference(name: str, skipped: float, _: Task) -> Run:
     return warmed_up(loss_run(posed, solver) if skipped else simulated)
 
 
-def _still(motion: object) -> Harmonic | LinearRamp:
+def _with_zero_amplitude(motion: object) -> Harmonic | LinearRamp:
     assert isinstance(motion, Harmonic | LinearRamp)
     return motion._replace(amplitude=0.0)
 
@@ -83,7 +83,10 @@ def inertia(name: str, skipped: float, _: Task) -> Run:
     (ramp,) = scene.loads.motions
     assert isinstance(ramp, LinearRamp)
     slow = scene.driven_by(
-        ramp._replace(duration=SLOWLY), static=False, duration=SLOWLY, integrator="implicit"
+        ramp._replace(duration=SLOW_DURATION),
+        static=False,
+        duration=SLOW_DURATION,
+        integrator="implicit",
     )
     plan = make_plan(scene if skipped else slow)
     posed = load_cases.LoadCase(scene if skipped else slow, load_cases.case(name).target)
@@ -109,7 +112,7 @@ def far_derivatives(name: str, skipped: float, _: Task) -> Run:
     posed = load_cases.case(name)
     solver = make_plan(posed.scene).solver
     if not skipped:
-        solver = everywhere(solver)
+        solver = with_full_adjoint(solver)
     return warmed_up(gradient_run(posed, solver, {}))
 
 
@@ -132,14 +135,14 @@ def cold_start(name: str, skipped: float, _: Task) -> Run:
 
 
 SKIPS = (
-    Skip("unloaded reference", unloaded_reference, True, EXACT, "it is zero"),
-    Skip("contact of open voids", distant_contact, True, EXACT, "checked after each solve"),
+    Skip("unloaded reference", unloaded_reference, True, ROUNDING, "it is zero"),
+    Skip("contact of open voids", distant_contact, True, ROUNDING, "checked after each solve"),
     Skip("inertia", inertia, False, 1e-2, "a slow load is a row of equilibria"),
-    Skip("outputs not asked for", other_outputs, True, EXACT, "the loss needs motions alone"),
-    Skip("far derivatives", far_derivatives, True, EXACT, "the design moves no ligament there"),
+    Skip("outputs not asked for", other_outputs, True, ROUNDING, "the loss needs motions alone"),
+    Skip("far derivatives", far_derivatives, True, ROUNDING, "the design moves no ligament there"),
     Skip("equal load cases", equal_cases, True, 1e-6, "the symmetry turns one into the other"),
     Skip("paths from rest", cold_start, False, 1e-9, "a similar design's path is near"),
-    Skip("compilation", fresh_process.compilation, True, EXACT, "loops are on the disk", 1),
+    Skip("compilation", fresh_process.compilation, True, ROUNDING, "loops are on the disk", 1),
     Skip("fresh factors", fresh_process.factors, True, 1e-4, "stages have a tolerance anyway"),
 )
 

@@ -31,7 +31,7 @@ from pipeline.runtime import UserError
 VIDEOS = Path("tests/data/tracking")
 DESIGNED = ("fig2", "fig4", "fig5", "small_push")
 """Scenes that optimisers are compared on."""
-FEW = optimiser_contest.OptimiserBudget(8, 20.0)
+SMALL_BUDGET = optimiser_contest.OptimiserBudget(8, 20.0)
 """Of a small scene."""
 IN_TURN: dict[str, Callable[[], Suite]] = {
     module.__name__.rpartition(".")[2]: module.suite
@@ -45,7 +45,7 @@ def suites(names: Sequence[str], videos: Path = VIDEOS) -> list[Suite]:
     Raises:
         UserError: there is none of a name.
     """
-    makers = _makers(videos)
+    makers = _suite_makers(videos)
     for name in names:
         if name not in makers:
             remedy = f"one of: {', '.join(makers)}"
@@ -54,7 +54,7 @@ def suites(names: Sequence[str], videos: Path = VIDEOS) -> list[Suite]:
     return [suite for suite in made if names or suite.short]
 
 
-def _makers(videos: Path) -> dict[str, Callable[[str], Suite]]:
+def _suite_makers(videos: Path) -> dict[str, Callable[[str], Suite]]:
     return {
         **{name: lambda _, make=make: make() for name, make in IN_TURN.items()},  # type: ignore[misc]
         **{f"precision_{scene}": partial(_precision, scene) for scene in load_cases.TITLES},
@@ -85,7 +85,7 @@ def _all_methods(scene: str, limits: MeasuringLimits, tell: Tell) -> list[Measur
 
 
 def _contest(scene: str, name: str) -> Suite:
-    budget = FEW if scene.startswith("small") else optimiser_contest.OptimiserBudget()
+    budget = SMALL_BUDGET if scene.startswith("small") else optimiser_contest.OptimiserBudget()
     told = f"{budget.evaluations} evaluations or {budget.seconds:g} s"
     return Suite(
         name,

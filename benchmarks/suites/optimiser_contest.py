@@ -23,7 +23,7 @@ REACH = 3.0
 """Bound of every variable, mm."""
 FEASIBLE = 1e-3
 """Largest violation of a design that counts, mm: below what can be made."""
-WORSE = 10.0
+FAILURE_FACTOR = 10.0
 """Loss over the first that stands for a design whose simulation fails."""
 
 
@@ -72,7 +72,7 @@ class BudgetedProblem:
         try:
             loss, gradient, _ = self(design)
         except SimulationError:
-            loss, gradient = WORSE * self.losses[0], np.zeros(self.n_variables)
+            loss, gradient = FAILURE_FACTOR * self.losses[0], np.zeros(self.n_variables)
         self._known = loss, np.array(gradient)
         return self._known
 
@@ -88,21 +88,21 @@ class OptimiserHistory(NamedTuple):
     final: Floats  # loss of the best feasible design, evaluated afresh
 
 
-def judged(
-    asked: BudgetedProblem, afresh: Callable[[Floats], tuple[float, Floats, Floats]]
+def judge(
+    asked: BudgetedProblem, reference_loss: Callable[[Floats], tuple[float, Floats, Floats]]
 ) -> OptimiserHistory:
-    """Judges a contest that is over; ``afresh`` is the loss and gradient to judge by."""
+    """Judges a contest that is over; ``reference_loss`` is the loss and gradient to judge by."""
     losses = np.array(asked.losses)
     places = [asked.constraints(design) for design in asked.designs]
     violation = np.maximum([-float(values.min()) for values, _ in places], 0.0)
     best, residual = np.full((2, len(losses)), np.nan)
-    steepest = float(np.abs(afresh(asked.designs[0])[1]).max())
+    steepest = float(np.abs(reference_loss(asked.designs[0])[1]).max())
     bound = np.full(asked.n_variables, REACH)
     champion, final = np.inf, np.nan
     for number, design in enumerate(asked.designs):
         if violation[number] <= FEASIBLE and losses[number] < champion:
             champion = losses[number]
-            final, gradient, _ = afresh(design)
+            final, gradient, _ = reference_loss(design)
             judge = stationarity(gradient, *places[number], design, -bound, bound, steepest)
             residual[number:] = judge.residual
         best[number] = champion if np.isfinite(champion) else np.nan
@@ -111,13 +111,13 @@ def judged(
     )
 
 
-def _own(method: Literal["sqp", "mma"], asked: BudgetedProblem) -> None:
+def _own_optimiser(method: Literal["sqp", "mma"], asked: BudgetedProblem) -> None:
     options = {"sqp": SqpOptions, "mma": MmaOptions}[method](evaluations=asked.evaluations)
     start = np.zeros(asked.n_variables)
     minimise(method, asked, asked.constraints, start, (-REACH, REACH), options)
 
 
-def _scipy(method: str, asked: BudgetedProblem) -> None:
+def _scipy_optimiser(method: str, asked: BudgetedProblem) -> None:
     of, options = asked.constraints, {"maxiter": float(asked.evaluations)}
     limits: Any = NonlinearConstraint(of.values, 0.0, np.inf, jac=lambda x: of(x)[1], hess=BFGS())
     if method == "SLSQP":
@@ -134,7 +134,7 @@ def _scipy(method: str, asked: BudgetedProblem) -> None:
     )
 
 
-def _nlopt(algorithm: str, asked: BudgetedProblem) -> None:
+def _nlopt_optimiser(algorithm: str, asked: BudgetedProblem) -> None:
     def loss(design: Floats, slope: Floats) -> float:
         value, gradient = asked.plain(design)
         if slope.size:
@@ -161,10 +161,12 @@ def _nlopt(algorithm: str, asked: BudgetedProblem) -> None:
 
 NLOPT = ("MMA", "CCSAQ", "SLSQP", "AUGLAG")
 OPTIMISERS: dict[str, Callable[[BudgetedProblem], None]] = {
-    "own sqp": partial(_own, "sqp"),
-    "own mma": partial(_own, "mma"),
-    **{f"scipy {method}": partial(_scipy, method) for method in ("SLSQP", "trust-constr")},
-    **{f"nlopt {name}": partial(_nlopt, f"LD_{name}") for name in NLOPT},
+    "own sqp": partial(_own_optimiser, "sqp"),
+    "own mma": partial(_own_optimiser, "mma"),
+    **{
+        f"scipy {method}": partial(_scipy_optimiser, method) for method in ("SLSQP", "trust-constr")
+    },
+    **{f"nlopt {name}": partial(_nlopt_optimiser, f"LD_{name}") for name in NLOPT},
 }
 """trust-constr is an interior-point method here, AUGLAG an augmented Lagrangian over CCSAQ."""
 
@@ -193,7 +195,7 @@ def prepare(name: str, budget: OptimiserBudget, optimiser: str) -> Run:
         )
         with suppress(BudgetSpentError):
             OPTIMISERS[optimiser](asked)
-        return Sample(judged(asked, evaluate)._asdict(), {})
+        return Sample(judge(asked, evaluate)._asdict(), {})
 
     return run
 

@@ -29,7 +29,7 @@ from sim.structure import ConcreteParameters, VoidAngleContact, parameters_at, q
 SIDES = (15, 30, 60, 120)
 ALL_IN_BANDS = 60
 """Largest lattice that is also solved with a band."""
-WAYS = {"Newton, by size": SIDES[-1], "Newton, band": ALL_IN_BANDS}
+STORAGES = {"Newton, by size": SIDES[-1], "Newton, band": ALL_IN_BANDS}
 """Ways to store the tangent, with the largest lattice that each is shown on."""
 COMPRESSION = 0.1
 REFERENCE = "two loads on the way, each to a hundredth of the usual residual"
@@ -58,14 +58,16 @@ def suite() -> Suite:
 
 
 def growth(sides: tuple[int, ...], limits: MeasuringLimits, tell: Tell) -> list[Measurement]:
-    """Measures every size by each of the WAYS, each in a process of its own."""
+    """Measures every size by each of the STORAGES, each in a process of its own."""
     reference = result_of(partial(strict, sides))
     measured: list[Measurement] = []
-    for way, largest in WAYS.items():
+    for storage, largest in STORAGES.items():
         for side in sides:
             if side <= largest:
                 settings = ((f"{side} × {side}", float(side)),)
-                method = Method(way, partial(grown, way), settings, tasks=("loss",), repeats=3)
+                method = Method(
+                    storage, partial(prepare_size, storage), settings, tasks=("loss",), repeats=3
+                )
                 measured += measure_settings(method, reference, side**2, limits, tell)
     return measured
 
@@ -112,9 +114,9 @@ def strict(sides: tuple[int, ...]) -> Run:
     return run
 
 
-def grown(way: str, side: float, _: str) -> Run:
-    """Prepares one size by one of the WAYS."""
-    return _solve(int(side), FASTEST if way == "Newton, by size" else ("band",))
+def prepare_size(storage: str, side: float, _: str) -> Run:
+    """Prepares one size by one of the STORAGES."""
+    return _solve(int(side), FASTEST if storage == "Newton, by size" else ("band",))
 
 
 def _solve(side: int, storages: tuple[Storage, ...] = FASTEST) -> Run:

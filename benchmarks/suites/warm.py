@@ -60,7 +60,7 @@ class WarmStart:
         return self._records if self.warm else None
 
     def keep(self, design: Floats, records: Sequence[StaticRecord]) -> None:
-        """Takes a path."""
+        """Stores a path."""
         del design
         self._records = records
         for record in records:

@@ -24,9 +24,9 @@ HEAD = (
     f"{'RMSE':<38}{'x px':>8}{'y px':>8}{'rot deg':>8}{'bias mm':>10}{'gross':>7}{'lost %':>8}"
     "   error/sigma x y rot, rank; faults, false; first frame, s; frames/s after it; none decoded"
 )
-_SHORT = 3
+_WARM_UP = 3
 """Frames that compiled loops are loaded with first."""
-_GROSS = (0.3, 0.3, np.deg2rad(3))
+_GROSS_ERROR = (0.3, 0.3, np.deg2rad(3))
 """Errors from which a pose is grossly wrong, mm and rad."""
 
 
@@ -64,8 +64,8 @@ def measure(folder: Path, limits: MeasuringLimits, tell: Tell) -> xr.Dataset:
         one, method, thinning = clips[place[0]], METHODS[place[1]], THINNINGS[place[2]]
         shown, truth = one.frames[::thinning], one.truth[::thinning]
         if thinning == THINNINGS[0]:
-            followed(one, shown[:_SHORT], method)
-        found = followed(one, shown, method)
+            track_timed(one, shown[:_WARM_UP], method)
+        found = track_timed(one, shown, method)
         spent[place] = found.each
         missed = found.displacement - truth
         known = np.isfinite(missed).all(axis=-1)
@@ -139,7 +139,7 @@ def order(stored: np.lib.npyio.NpzFile, columns: int) -> Ints:
     return np.argsort(stored["unit_ij"][:, 0] + columns * stored["unit_ij"][:, 1])
 
 
-class Followed(NamedTuple):
+class TimedTrack(NamedTuple):
     """Holds where a method saw the units of a video, and the processor time that it took."""
 
     displacement: Floats  # (n_frames, n_units, 3)
@@ -148,7 +148,7 @@ class Followed(NamedTuple):
     line: Callable[[], str]  # of the table, of a video with all of its frames
 
 
-def followed(one: TruthVideo, shown: list[Frame], method: str) -> Followed:
+def track_timed(one: TruthVideo, shown: list[Frame], method: str) -> TimedTrack:
     """Tracks frames; the time that decoding takes is not counted."""
     clock = [time.process_time()]
 
@@ -157,7 +157,7 @@ def followed(one: TruthVideo, shown: list[Frame], method: str) -> Followed:
 
     if method == "plain OpenCV":
         track, scale = None, one.scale
-        found = plain_opencv.track(_told(shown, tell), one.specimen, scale)
+        found = plain_opencv.track(_count_frames(shown, tell), one.specimen, scale)
     else:
         track = track_video(iter(shown), one.specimen, one.scale, tell)
         found, scale = np.asarray(track.displacement), 1 / track.calibration.pixel
@@ -165,13 +165,13 @@ def followed(one: TruthVideo, shown: list[Frame], method: str) -> Followed:
     each = rest / (len(shown) - 1)
 
     def line() -> str:
-        stated = "" if track is None else honesty(track, one)
+        stated = "" if track is None else sigma_calibration(track, one)
         return f"{accuracy(found, one, scale)}{stated:<49}{first:6.2f}{1 / each:10.1f}"
 
-    return Followed(found, first, each, line)
+    return TimedTrack(found, first, each, line)
 
 
-def _told(shown: list[Frame], tell: Callable[[], None]) -> Iterator[Image]:
+def _count_frames(shown: list[Frame], tell: Callable[[], None]) -> Iterator[Image]:
     """Yields the pictures of frames, and tells when each of them is done with."""
     for frame in shown:
         yield frame.image.astype(np.uint8)
@@ -186,12 +186,12 @@ def accuracy(found: Floats, real: TruthVideo, px_per_mm: float) -> str:
     scale = np.array([px_per_mm, px_per_mm, 180 / np.pi])
     rms = np.sqrt(np.mean(error[seen] ** 2, axis=0)) * scale
     bias = np.abs(error[seen].mean(axis=0))[:2].max()
-    gross = (np.abs(error[known]) > _GROSS).any(axis=-1).sum()
+    gross = (np.abs(error[known]) > _GROSS_ERROR).any(axis=-1).sum()
     lost = 100 * (real.visible & ~known).sum() / real.visible.sum()
     return f"{rms[0]:8.4f}{rms[1]:8.4f}{rms[2]:8.3f}{bias:10.5f}{gross:7d}{lost:8.2f}"
 
 
-def honesty(track: Track, real: TruthVideo) -> str:
+def sigma_calibration(track: Track, real: TruthVideo) -> str:
     """Formats spread of error over sigma, their least rank correlation, faults found and false."""
     from scipy.stats import spearmanr
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from pipeline.calibration import moved_parts
+from pipeline.calibration import tracked_parts
 from pipeline.calibration.inputs import KnownPictures
 from pipeline.problem.reading import load_section
 from pipeline.tracking.frames import read_pictures
@@ -69,7 +69,7 @@ def patches(folder: Path = IMAGES, pictures: Path = PICTURES) -> Iterator[KnownP
                 patch = Patch(before, after, _square(x, y), np.array([x, y], float))
                 yield KnownPatch("DIC Challenge 15", patch, np.array([0.0, v, 0.0]))
     parts = load_section(pictures, KnownPictures).rigid_parts
-    for each in moved_parts(parts, pictures.parent):
+    for each in tracked_parts(parts, pictures.parent):
         group = f"escapement, {parts.parts[each.part].name}, against DICe"
         yield KnownPatch(group, each.patch, each.reference, whole=True)
 
@@ -78,7 +78,7 @@ def _square(x: float, y: float) -> Floats:
     return np.array([x, y]) + _HALF * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
 
 
-def flowed(patch: Patch, start: Floats) -> Floats:
+def optical_flow(patch: Patch, start: Floats) -> Floats:
     """Fits the motion (3,) to points that OpenCV's pyramidal Lucas-Kanade follows."""
     low, high = patch.outline.min(axis=0), patch.outline.max(axis=0)
     x, y = np.meshgrid(np.arange(low[0], high[0], _STEP), np.arange(low[1], high[1], _STEP))
@@ -108,7 +108,7 @@ def _rigid(patch: Patch, before: Floats, after: Floats) -> Floats:
     return np.append(shift, turn)
 
 
-def correlated(known: list[KnownPatch]) -> Floats:
+def image_correlation(known: list[KnownPatch]) -> Floats:
     """Fits motions (patches, 3) to points that pyvale follows; NaN where it finds none.
 
     Each pair of pictures is correlated once, whatever patches are in it.
@@ -147,11 +147,11 @@ def table(folder: Path = IMAGES) -> str:
     for error, one in zip(errors, known, strict=True):
         start = find_motion(one.patch)
         if start is not None:
-            error[0] = fit_motion(one.patch, start, whole=one.whole) - one.motion
-            error[1] = flowed(one.patch, start) - one.motion
+            error[0] = fit_motion(one.patch, start, include_edge=one.whole) - one.motion
+            error[1] = optical_flow(one.patch, start) - one.motion
     named = "pyvale"
     if PYVALE.exists():
-        errors[:, 2] = correlated(known) - [one.motion for one in known]
+        errors[:, 2] = image_correlation(known) - [one.motion for one in known]
     else:
         named = "pyvale (not installed)"
         LOG.warning("%s is not there: `make bench-tracking` installs pyvale", PYVALE)

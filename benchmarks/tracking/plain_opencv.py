@@ -16,12 +16,12 @@ from pipeline.tracking.detect import detect_lattice
 from pipeline.tracking.geometry import SpecimenOutlines, rigid_motion
 from sim.core import Floats, Image
 
-_HALF = 0.16
+_HALF_WINDOW = 0.16
 """Half the side of what is matched, and how far it is looked for, pitches."""
 _REACH = 0.12
-_INWARD = 0.85
+_CORNER_INSET = 0.85
 """Corners are looked for so far from the middle, of their distance from it."""
-_LIKE = 0.6
+_LEAST_CORRELATION = 0.6
 """Least correlation of a corner that is found."""
 
 
@@ -31,7 +31,9 @@ def track(images: Iterator[Image], specimen: SpecimenOutlines, px_per_mm: float)
     found = detect_lattice(first, specimen, px_per_mm)[0]
     flip = np.array([px_per_mm, -px_per_mm])
     followers = [
-        _Follower(first, place, _INWARD * specimen.polygon(one) * flip, specimen.pitch * px_per_mm)
+        _CornerTracker(
+            first, place, _CORNER_INSET * specimen.polygon(one) * flip, specimen.pitch * px_per_mm
+        )
         for one, place in zip(found.unit, found.blob, strict=True)
     ]
     out = [np.full((specimen.count, 3), np.nan)]
@@ -42,11 +44,11 @@ def track(images: Iterator[Image], specimen: SpecimenOutlines, px_per_mm: float)
     return np.array(out) * [1 / px_per_mm, -1 / px_per_mm, -1]
 
 
-class _Follower:
+class _CornerTracker:
     """Follows the corners of one unit, from frame to frame."""
 
     def __init__(self, image: Image, centre: Floats, corners: Floats, pitch: float) -> None:
-        self._half, self._reach = int(_HALF * pitch), int(_REACH * pitch)
+        self._half, self._reach = int(_HALF_WINDOW * pitch), int(_REACH * pitch)
         self._image, self._centre = image, centre
         self._corners = np.round(centre + corners)
         self._turn, self._shift = 0.0, np.zeros(2)
@@ -75,7 +77,7 @@ class _Follower:
         window = _turned(image, middle, np.eye(2), self._half + self._reach)
         scores = np.asarray(cv2.matchTemplate(window, patch, cv2.TM_CCOEFF_NORMED), np.float64)
         _, best, _, (column, row) = cv2.minMaxLoc(scores)
-        if not best > _LIKE:
+        if not best > _LEAST_CORRELATION:
             return None
         peak = np.array([column + _peak(scores[row], column), row + _peak(scores[:, column], row)])
         return np.asarray(middle - self._reach + peak)

@@ -16,7 +16,7 @@ _STEP, _SUBSET, _MARGIN = 4, 21, 12
 """Distance of the points, side of the subsets, and rim of the pictures that is left out, px."""
 
 
-def followed(before: np.ndarray, after: np.ndarray, seed: np.ndarray) -> np.ndarray:
+def track_points(before: np.ndarray, after: np.ndarray, seed: np.ndarray) -> np.ndarray:
     """Returns points and where they are afterwards (n, 4), px."""
     inner = np.zeros(before.shape, bool)
     inner[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN] = True
@@ -45,5 +45,5 @@ if __name__ == "__main__":
     given = np.load(sys.argv[1])
     pairs = range(len(given.files) // 3)
     names = ("before", "after", "seed")
-    made = {f"points_{k}": followed(*(given[f"{one}_{k}"] for one in names)) for k in pairs}
+    made = {f"points_{k}": track_points(*(given[f"{one}_{k}"] for one in names)) for k in pairs}
     np.savez(sys.argv[2], allow_pickle=False, **made)

@@ -44,7 +44,7 @@ def table(folder: Path) -> str:
             grid=_UNITS, view=view, times=count / _MOVES, stamps=count / RATE, film=codec
         )
         path = folder / f"speed_{place}.mkv"
-        clip = wild_clips.film(script, path)
+        clip = wild_clips.film_clip(script, path)
         begin = time.process_time()
         decoded = sum(1 for _ in read_frames(path))
         decoding = (time.process_time() - begin) / decoded

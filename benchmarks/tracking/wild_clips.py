@@ -40,12 +40,12 @@ class Errors(NamedTuple):
     gross: int  # number of poses that are called good and are wrong
     good: int  # number of those that are called good
     lost: float  # part of what is wholly in view that is missing
-    honesty: Floats  # (3,) root mean square of error over sigma
+    sigma_ratio: Floats  # (3,) root mean square of error over sigma
     found: int  # faults of timing
     false: int
 
 
-def tracked(clip: WildClip) -> Track:
+def track_clip(clip: WildClip) -> Track:
     """Tracks a clip with the keys of its recording."""
     setup = RecordingSetup(held=clip.held, **clip.keys)
     return track_video(iter(clip.frames), clip.specimen, clip.scale, setup=setup)
@@ -81,10 +81,10 @@ def table(folder: Path) -> Iterator[str]:
     )
     yield "|---" * 7 + "|"
     for name in SCRIPTS:
-        clip = make(name, folder)
-        found = errors(clip, tracked(clip))
+        clip = make_clip(name, folder)
+        found = errors(clip, track_clip(clip))
         least, turn = bound(name)
-        honest = " ".join(f"{value:.2f}" for value in found.honesty)
+        honest = " ".join(f"{value:.2f}" for value in found.sigma_ratio)
         yield (
             f"| {name.replace('_', ' ')} | {found.rms:.4f} ({least:.4f}) |"
             f" {found.turn:.3f} ({turn:.3f}) | {found.gross} of"
@@ -115,12 +115,12 @@ def specimen(grid: Mapping[str, Any] = GRID) -> SpecimenOutlines:
     return outlines_of_design(import_video.design(dict(grid)))
 
 
-def make(name: str, folder: Path, frames: int | None = None) -> WildClip:
+def make_clip(name: str, folder: Path, frames: int | None = None) -> WildClip:
     """Renders a clip of the catalogue, or its first frames; a folder holds what has a codec."""
-    return film(SCRIPTS[name], folder / f"{name}.mkv", frames)
+    return film_clip(SCRIPTS[name], folder / f"{name}.mkv", frames)
 
 
-def film(script: ClipScript, path: Path, frames: int | None = None) -> WildClip:
+def film_clip(script: ClipScript, path: Path, frames: int | None = None) -> WildClip:
     """Renders a clip, or its first frames; what has a codec goes through a file."""
     shown = specimen(script.grid)
     times = script.times[:frames]
@@ -135,7 +135,7 @@ def film(script: ClipScript, path: Path, frames: int | None = None) -> WildClip:
     fault[[one for one in script.fault if one < len(times)]] = True
     truth = own(times) if script.follows else seen(times)
     return WildClip(
-        list(_filmed(images, stamps, script, path)),
+        list(_film_through_file(images, stamps, script, path)),
         shown,
         script.view.scale,
         truth - truth[0],
@@ -183,7 +183,7 @@ def _motions(shown: SpecimenOutlines, script: ClipScript) -> tuple[Motion, Motio
     return own, seen
 
 
-def _filmed(
+def _film_through_file(
     images: list[Singles], stamps: Floats, script: ClipScript, path: Path
 ) -> Iterator[Frame]:
     if script.film is None:

@@ -30,11 +30,11 @@ def assemble_calibration(fit: Fit) -> tuple[xr.Dataset, Estimate]:
         SimulationError: an equilibrium on the way is not stable.
     """
     known = estimate_errors(fit)
-    found, told = estimate_constants(fit, known), measure_quality(fit)
+    found, quality = estimate_constants(fit, known), measure_quality(fit)
     experiments, names = fit.model.experiments, list(found.names)
     begin = [fit.model.begin.value(name) for name in found.names]
-    fitted = np.arange(len(names)) >= found.wanted
-    peaks = np.array([_by_peaks(each) for each in experiments])
+    fitted = np.arange(len(names)) >= found.n_fitted
+    peaks = np.array([_peak_ratio(each) for each in experiments])
     variables = {
         "origin": ("parameter", fitted.astype(np.int8)),
         "status": ("parameter", found.status.astype(np.int8)),
@@ -48,10 +48,10 @@ def assemble_calibration(fit: Fit) -> tuple[xr.Dataset, Estimate]:
         "correlation": (("parameter", "with_parameter"), found.correlation),
         "condition": ((), found.condition),
         "newton_step": ((), known.newton),
-        **{field: ("set", values) for field, values in told._asdict().items()},
+        **{field: ("set", values) for field, values in quality._asdict().items()},
         "peak_ratio": ("set", peaks[:, 0]),
         "peak_ratio_error": ("set", peaks[:, 1]),
-        **_points(fit),
+        **_point_variables(fit),
     }
     labels = {
         "parameter": names,
@@ -60,42 +60,42 @@ def assemble_calibration(fit: Fit) -> tuple[xr.Dataset, Estimate]:
         "set": [each.measured.name for each in experiments],
         "kind": ("set", [each.measured.kind for each in experiments]),
     }
-    advice = list_warnings(fit, found, told, known.newton)
+    advice = list_warnings(fit, found, quality, known.newton)
     made = xr.Dataset(variables, labels)
     return made.assign_attrs(warnings="\n".join(advice)), found
 
 
-def _by_peaks(each: Experiment) -> tuple[float, float]:
+def _peak_ratio(each: Experiment) -> tuple[float, float]:
     return (each.peaks.ratio, each.peaks.error) if isinstance(each, DecayTest) else (np.nan, np.nan)
 
 
-def _points(fit: Fit) -> dict[str, tuple[str, Floats]]:
+def _point_variables(fit: Fit) -> dict[str, tuple[str, Floats]]:
     every = [each.measured for each in fit.model.experiments]
     return {
         "set_of_point": ("point", fit.model.set_of_row),
-        "channel": ("point", _joined([each.channels for each in every])),
-        "abscissa": ("point", _joined([each.abscissa for each in every])),
-        "measured": ("point", _joined([each.values for each in every])),
-        "fitted": ("point", _joined(fit.model.predictions(fit.unknowns))),
+        "channel": ("point", _concatenate([each.channels for each in every])),
+        "abscissa": ("point", _concatenate([each.abscissa for each in every])),
+        "measured": ("point", _concatenate([each.values for each in every])),
+        "fitted": ("point", _concatenate(fit.model.predictions(fit.unknowns))),
         "sigma": (
             "point",
-            _joined([each.sigma for each in every]) * fit.level[fit.model.set_of_row],
+            _concatenate([each.sigma for each in every]) * fit.level[fit.model.set_of_row],
         ),
         "residual": ("point", fit.residual),
     }
 
 
-def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
+def _concatenate(parts: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate(parts)
 
 
 def material_fragment(fit: Fit, found: Estimate, title: str, *, synthetic: bool) -> str:
     """Writes the lines `material:` of a problem file, with the interval of each fitted value."""
     here = fit.model.constants(fit.unknowns)
-    told = {
+    intervals = {
         name: "  # not determined by the data"
         if status == UNDETERMINED
-        else f"  # 95 %: {_words(name, low)} to {_words(name, high)}"
+        else f"  # 95 %: {_format(name, low)} to {_format(name, high)}"
         for name, low, high, status in zip(
             found.names, found.low, found.high, found.status, strict=True
         )
@@ -106,12 +106,12 @@ def material_fragment(fit: Fit, found: Estimate, title: str, *, synthetic: bool)
         f"# {title or 'Calibration'}: {FRAGMENT}",
         "material:",
         f"  density: {here.material.density * 1e9:.6g} kg/m^2",
-        *(_line(here, name, told) for name in _STIFFNESS),
+        *(_line(here, name, intervals) for name in _STIFFNESS),
         "  damping:",
-        *(f"  {_line(here, name, told)}".replace("damping_", "") for name in _damping(here)),
+        *(f"  {_line(here, name, intervals)}".replace("damping_", "") for name in _damping(here)),
     ]
     if here.cutoff is not None:
-        angle = _line(here, "contact_cutoff", told).replace("contact_cutoff", "cutoff_angle")
+        angle = _line(here, "contact_cutoff", intervals).replace("contact_cutoff", "cutoff_angle")
         lines += ["contact:", angle]
     return "\n".join(lines) + "\n"
 
@@ -124,10 +124,10 @@ def _damping(here: Constants) -> tuple[ConstantName, ...]:
     return ("damping_ratio",) if by_ratio else ("damping_translation", "damping_rotation")
 
 
-def _line(here: Constants, name: ConstantName, told: dict[ConstantName, str]) -> str:
-    return f"  {name}: {_words(name, here.value(name))}{told.get(name, '')}"
+def _line(here: Constants, name: ConstantName, intervals: dict[ConstantName, str]) -> str:
+    return f"  {name}: {_format(name, here.value(name))}{intervals.get(name, '')}"
 
 
-def _words(name: ConstantName, value: float) -> str:
+def _format(name: ConstantName, value: float) -> str:
     unit, factor = WRITTEN[name]
     return f"{value * factor:.6g} {unit}".rstrip()

@@ -47,9 +47,9 @@ def _true_scene(made: TrackedSpecimen, true: Constants) -> Scene:
     axial, shear, bending, translation, rotation = true.numbers
     constants = Material(
         true.material.density,
-        made.stiffer[:, 0] * axial,
-        made.stiffer[:, 1] * shear,
-        made.stiffer[:, 2] * bending,
+        made.stiffness_factors[:, 0] * axial,
+        made.stiffness_factors[:, 1] * shear,
+        made.stiffness_factors[:, 2] * bending,
         scene.structure.material.contact_stiffness,
         translation,
         rotation,

@@ -15,12 +15,12 @@ from sim.core import Floats, Ints
 DETERMINED, WEAK, UNDETERMINED, AT_BOUND = range(4)
 WEAK_FROM, NOTHING_FROM = 0.1, 1.0
 """Standard errors of logarithms from which a constant counts as weakly determined, and as not."""
-TOLD_APART = 30.0
+ILL_CONDITIONED = 30.0
 """Condition number from which constants are hardly told apart."""
 CONVERGED = 0.05
-ALIKE = 1.25
+FREQUENCY_RATIO = 1.25
 """Ratio of a trace's frequency to that of the law of its damping, up to which both swing alike."""
-_MANY = 1e6
+_NORMAL_FREEDOM = 1e6
 """Freedom from which Student's distribution is the normal one."""
 DERIVED: tuple[ConstantName, ...] = ("damping_translation", "damping_rotation")
 """Constants that follow from a damping ratio by the authors' law."""
@@ -30,7 +30,7 @@ class Estimate(NamedTuple):
     """Holds values of the constants, the wanted ones before those that follow from them."""
 
     names: tuple[ConstantName, ...]  # of the constants
-    wanted: int  # how many of them were fitted
+    n_fitted: int  # how many of them were fitted
     value: Floats  # (n,) in working units
     error: Floats  # (n,) standard errors of their logarithms
     bound: Floats  # (n,) of Cramer and Rao, of the standard errors
@@ -66,7 +66,7 @@ def estimate_constants(fit: Fit, known: Uncertainty) -> Estimate:
     logs = fit.unknowns[: len(names)]
     turn = slopes(fit.model.begin, names, logs, lambda each: each.logs(every))
     covariance = turn @ known.covariance @ turn.T
-    error, bound = (np.sqrt(np.diag(each)) for each in (covariance, turn @ known.least @ turn.T))
+    error, bound = (np.sqrt(np.diag(each)) for each in (covariance, turn @ known.bound @ turn.T))
     here = fit.model.constants(fit.unknowns)
     reach = _quantiles(fit, turn) * error
     low, high = (_values(here, every, here.logs(every) + sign * reach) for sign in (-1, 1))
@@ -98,19 +98,25 @@ def _quantiles(fit: Fit, turn: Floats) -> Floats:
     sum of those V_k that the sets leave, each known by its own freedom f_k, and has that of Welch
     and Satterthwaite (1946, Biometrics 2, 110): f = (sum V_k)^2 / sum (V_k^2 / f_k).
     """
-    way = turn @ invert_information(fit.jacobian)[: turn.shape[1]]
-    rows, spread = fit.model.set_of_row, (fit.jacobian @ way.T) ** 2
-    variance, doubt = np.zeros((2, len(turn)))
-    for k, (each, left) in enumerate(zip(fit.model.experiments, _freedom(fit), strict=True)):
+    sensitivity = turn @ invert_information(fit.jacobian)[: turn.shape[1]]
+    rows, spread = fit.model.set_of_row, (fit.jacobian @ sensitivity.T) ** 2
+    variance, freedom_sum = np.zeros((2, len(turn)))
+    for k, (each, left) in enumerate(
+        zip(fit.model.experiments, _residual_freedom(fit), strict=True)
+    ):
         part = spread[rows == k].sum(axis=0)
         variance += part
-        doubt += 0.0 if each.measured.known else part**2 / max(left, 1.0)
-    freedom, told = np.full_like(variance, _MANY), variance > 0.0  # or no set tells of it
-    freedom[told] = variance[told] ** 2 / np.maximum(doubt, 1e-12 * variance**2)[told]
-    return np.where(freedom < _MANY, stdtrit(np.maximum(freedom, 1.0), 0.975), ndtri(0.975))
+        freedom_sum += 0.0 if each.measured.known else part**2 / max(left, 1.0)
+    informed = variance > 0.0  # by any set
+    freedom = np.full_like(variance, _NORMAL_FREEDOM)
+    total = np.maximum(freedom_sum, 1e-12 * variance**2)
+    freedom[informed] = variance[informed] ** 2 / total[informed]
+    return np.where(
+        freedom < _NORMAL_FREEDOM, stdtrit(np.maximum(freedom, 1.0), 0.975), ndtri(0.975)
+    )
 
 
-def _freedom(fit: Fit) -> Floats:
+def _residual_freedom(fit: Fit) -> Floats:
     """Computes what the fit leaves of the sets' freedom (n_sets,)."""
     basis = np.linalg.svd(fit.jacobian, full_matrices=False)[0]
     taken, rows = (basis**2).sum(axis=1), fit.model.set_of_row
@@ -123,7 +129,7 @@ def measure_quality(fit: Fit) -> Quality:
     rows, sets = fit.model.set_of_row, range(len(fit.model.experiments))
     return Quality(
         points=np.array([(rows == k).sum() for k in sets]),
-        freedom=_freedom(fit),
+        freedom=_residual_freedom(fit),
         chi_square=np.array([(fit.residual[rows == k] ** 2).sum() for k in sets]),
         level=fit.level,
         autocorrelation=np.array([_autocorrelation(fit.residual[rows == k], fit, k) for k in sets]),
@@ -138,7 +144,7 @@ def _autocorrelation(residual: Floats, fit: Fit, k: int) -> float:
     return float(product / max((residual**2).mean(), 1e-300))
 
 
-def list_warnings(fit: Fit, found: Estimate, told: Quality, newton: float) -> list[str]:
+def list_warnings(fit: Fit, found: Estimate, quality: Quality, newton: float) -> list[str]:
     """Warns of weak constants and of sets that the model misses, a sentence each."""
     words = {
         WEAK: "{name} is weakly determined by these data: its standard error is {error:.0%}",
@@ -152,8 +158,9 @@ def list_warnings(fit: Fit, found: Estimate, told: Quality, newton: float) -> li
         for name, status, error in zip(found.names, found.status, found.error, strict=True)
         if status != DETERMINED
     ]
-    if found.condition > TOLD_APART:
-        mutual = np.abs(found.correlation[: found.wanted, : found.wanted]) - np.eye(found.wanted)
+    if found.condition > ILL_CONDITIONED:
+        n = found.n_fitted
+        mutual = np.abs(found.correlation[:n, :n]) - np.eye(n)
         one, other = np.unravel_index(mutual.argmax(), mutual.shape)
         out.append(
             f"{found.names[one]} and {found.names[other]} are hardly told apart (correlation"
@@ -164,39 +171,41 @@ def list_warnings(fit: Fit, found: Estimate, told: Quality, newton: float) -> li
             f"the fit has not settled: by the adjoint's gradient it is {newton:.2g} standard"
             " errors from the least sum of squares"
         )
-    return out + [line for k in range(len(told.points)) for line in _of_set(fit, told, k)]
+    return out + [
+        line for k in range(len(quality.points)) for line in _set_warnings(fit, quality, k)
+    ]
 
 
-def _of_set(fit: Fit, told: Quality, k: int) -> list[str]:
+def _set_warnings(fit: Fit, quality: Quality, k: int) -> list[str]:
     measured = fit.model.experiments[k].measured
     out = [f"{measured.name}: {remark}" for remark in measured.remarks]
-    excess = told.chi_square[k] / max(told.freedom[k], 1.0)
-    if measured.known and excess > 1 + 4 * np.sqrt(2 / max(told.freedom[k], 1.0)):
+    excess = quality.chi_square[k] / max(quality.freedom[k], 1.0)
+    if measured.known and excess > 1 + 4 * np.sqrt(2 / max(quality.freedom[k], 1.0)):
         out.append(
             f"{measured.name}: residuals are {np.sqrt(excess):.2f} times what the stated noise"
             " explains, so the intervals are too narrow: state no noise, to have it estimated"
         )
-    chance = 4 / np.sqrt(told.points[k])
-    if told.autocorrelation[k] > max(chance, 0.15):
+    chance = 4 / np.sqrt(quality.points[k])
+    if quality.autocorrelation[k] > max(chance, 0.15):
         out.append(
             f"{measured.name}: residuals that follow one another are alike (correlation"
-            f" {told.autocorrelation[k]:.2f}): the model misses something, and the intervals are"
+            f" {quality.autocorrelation[k]:.2f}): the model misses something, and the intervals are"
             " too narrow"
         )
-    return out + _of_decay(fit, k)
+    return out + _decay_warnings(fit, k)
 
 
-def _of_decay(fit: Fit, k: int) -> list[str]:
+def _decay_warnings(fit: Fit, k: int) -> list[str]:
     """Warns of a trace of units that swing otherwise than the law of its damping ratio has it."""
     experiment, here = fit.model.experiments[k], fit.model.constants(fit.unknowns)
     if not isinstance(experiment, DecayTest):
         return []
-    pitch, swung = experiment.pitch(here), experiment.peaks.frequency / (2 * np.pi)
-    if 1 / ALIKE <= pitch <= ALIKE:
+    ratio, measured = experiment.frequency_ratio(here), experiment.peaks.frequency / (2 * np.pi)
+    if 1 / FREQUENCY_RATIO <= ratio <= FREQUENCY_RATIO:
         return []
     return [
-        f"{experiment.measured.name}: the trace swings at {swung:.3g} Hz, where one unit on one"
-        f" ligament of these constants turns at {swung / pitch:.3g} Hz: its damping ratio is not"
+        f"{experiment.measured.name}: the trace swings at {measured:.3g} Hz, where one unit on one"
+        f" ligament of these constants turns at {measured / ratio:.3g} Hz: its damping ratio is not"
         " the one that damping is made of; let both units hang free, and check density, spacing"
         " and bending_stiffness"
     ]

@@ -25,11 +25,11 @@ from pipeline.calibration.least_squares import Fit, FitModel, fit_least_squares
 from pipeline.runtime import UserError
 from sim.core import Floats, SimulationError
 
-_ROUNDS = 5
+_ITERATIONS = 5
 """At most, in which the effect of the drive's noise is found anew, at better constants."""
 _HALVINGS = 5
 """At most, of the steps in time."""
-AGREED = 0.2
+CONVERGED = 0.2
 """Constants that change by less, in standard errors, are final."""
 
 
@@ -48,7 +48,7 @@ def fit_calibration(asked: Calibration, path: Path) -> Fit:
         what = f"{values} values do not determine {len(model.start)} unknowns"
         raise UserError(what, file=path, key="data", remedy=remedy)
     try:
-        return fit_settled(model)
+        return fit_converged(model)
     except SimulationError as error:
         raise simulation_fault(error, path) from error
 
@@ -83,46 +83,48 @@ def read_experiment(asked: MeasurementSet, begin: Constants, path: Path) -> Expe
     return full_field.pose_track(asked, folder, begin, tracked_specimen.read_track(asked, folder))
 
 
-def fit_settled(model: FitModel) -> Fit:
+def fit_converged(model: FitModel) -> Fit:
     """Fits with steps in time, and an effect of the drives' noise, that suit the result."""
     if not any(isinstance(each, FullFieldExperiment) for each in model.experiments):
         return fit_least_squares(model)
-    found = fit_least_squares(_noisy(model, model.begin))
-    for _ in range(_ROUNDS):
-        before, known = found, _noisy(found.model, found.model.constants(found.unknowns))
-        found = _resolved(fit_least_squares(known, before.unknowns))
-        if _moved(found, found.unknowns - before.unknowns) < AGREED:
+    found = fit_least_squares(_with_drive_noise(model, model.begin))
+    for _ in range(_ITERATIONS):
+        before, known = found, _with_drive_noise(found.model, found.model.constants(found.unknowns))
+        found = _refine_steps(fit_least_squares(known, before.unknowns))
+        if _largest_change(found, found.unknowns - before.unknowns) < CONVERGED:
             break
     return found
 
 
-def _resolved(found: Fit) -> Fit:
+def _refine_steps(found: Fit) -> Fit:
     """Fits with steps in time so short that half of them would move no constant."""
     for _ in range(_HALVINGS):
-        finer = found.model._replace(experiments=[_finer(each) for each in found.model.experiments])
+        finer = found.model._replace(
+            experiments=[_with_finer_steps(each) for each in found.model.experiments]
+        )
         change = finer.residual(found.unknowns) - found.model.residual(found.unknowns)
         level = found.level[found.model.set_of_row]
         shift = -invert_information(found.jacobian) @ (found.jacobian.T @ (change / level))
-        if _moved(found, shift) < AGREED:
+        if _largest_change(found, shift) < CONVERGED:
             return found
         found = fit_least_squares(finer, found.unknowns)
     return found
 
 
-def _moved(found: Fit, change: Floats) -> float:
+def _largest_change(found: Fit, change: Floats) -> float:
     """Computes the largest of the constants' changes, in standard errors."""
     error = np.sqrt(np.diag(invert_information(found.jacobian)))
     return float(np.abs(change / error)[: len(found.model.names)].max())
 
 
-def _noisy(model: FitModel, at: Constants) -> FitModel:
+def _with_drive_noise(model: FitModel, at: Constants) -> FitModel:
     """Adds the effect of the drives' noise at some constants to the model."""
-    knowing = [
+    experiments = [
         each.with_drive_noise(at) if isinstance(each, FullFieldExperiment) else each
         for each in model.experiments
     ]
-    return model._replace(experiments=knowing)
+    return model._replace(experiments=experiments)
 
 
-def _finer(each: Experiment) -> Experiment:
+def _with_finer_steps(each: Experiment) -> Experiment:
     return each.finer() if isinstance(each, FullFieldExperiment) else each

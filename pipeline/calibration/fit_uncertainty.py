@@ -23,7 +23,7 @@ class Uncertainty(NamedTuple):
     covariance: Floats  # (n_names, n_names)
     # (n_names, n_names), the inverse of the information: the Cramer-Rao bound of the covariance, at
     # the stated, or estimated, noise
-    least: Floats
+    bound: Floats
     # largest step that Newton's method would still take by the adjoint's gradient, in standard
     # errors; how far the solution is from the least sum of squares
     newton: float
@@ -44,13 +44,13 @@ def estimate_errors(fit: Fit) -> Uncertainty:
     by_adjoint[wanted] = adjoint_gradient(fit)
     step = inverse @ by_adjoint
     bound = np.sqrt(np.diag(inverse))
-    covariance = _wider(inverse, information_lost(fit))[wanted, wanted]
+    covariance = _inflate(inverse, drive_information(fit))[wanted, wanted]
     newton = float(np.abs(step / bound)[wanted].max())
     return Uncertainty(covariance, inverse[wanted, wanted], newton)
 
 
-def _wider(inverse: Floats, lost: Floats) -> Floats:
-    """Widens a covariance by the loss of a part of the information whose inverse it was."""
+def _inflate(inverse: Floats, lost: Floats) -> Floats:
+    """Inflates a covariance for the loss of a part of the information whose inverse it was."""
     if not lost.any():
         return inverse
     root = np.linalg.cholesky(inverse)
@@ -59,7 +59,7 @@ def _wider(inverse: Floats, lost: Floats) -> Floats:
     return np.asarray(axes @ axes.T)
 
 
-def information_lost(fit: Fit) -> Floats:
+def drive_information(fit: Fit) -> Floats:
     """Computes the part of the second derivatives that drives known by measurement alone take.
 
     Which motion of the driven units explains the residuals best is another one at other constants:
@@ -76,23 +76,23 @@ def information_lost(fit: Fit) -> Floats:
     lost = np.zeros((len(fit.unknowns), len(fit.unknowns)))
     for k, each in enumerate(fit.model.experiments):
         if isinstance(each, FullFieldExperiment) and len(each.measured.spread):
-            lost += _lost_to_drive(fit, k, each)
+            lost += _drive_information(fit, k, each)
     return lost
 
 
-def _lost_to_drive(fit: Fit, k: int, each: FullFieldExperiment) -> Floats:
+def _drive_information(fit: Fit, k: int, each: FullFieldExperiment) -> Floats:
     model, level = fit.model, fit.level[k]
     rho = each.measured.transposed(fit.residual[model.set_of_row == k]) * level
     explained = np.zeros((len(each.changes), len(fit.unknowns)))
     turned = np.zeros_like(explained)
     for column, name in enumerate(model.names):
-        if name not in each.sees:
+        if name not in each.depends_on:
             continue
         step = _STEP * np.eye(1, len(fit.unknowns), column)[0]
         ends = [model.constants(fit.unknowns + sign * step) for sign in (1, -1)]
         ahead, behind = (each.predict(end, np.zeros(0)) for end in ends)
         explained[:, column] = each.measured.causes((ahead - behind) / (2 * _STEP))
-        ahead, behind = (each.pulled_to_noise(end, rho) for end in ends)
+        ahead, behind = (each.pull_back_to_noise(end, rho) for end in ends)
         turned[:, column] = (ahead - behind) / (2 * _STEP)
     mixed = explained.T @ turned
     return (mixed + mixed.T + turned.T @ each.measured.unexplained(turned)) / level**2
@@ -119,7 +119,7 @@ def adjoint_gradient(fit: Fit) -> Floats:
             total += column
             continue
         bar = each.measured.transposed(fit.residual[mine]) / fit.level[k]
-        by_numbers = each.pulled_back(constants, bar)
+        by_numbers = each.pull_back(constants, bar)
         total += np.where(by_columns, column, by_numbers @ slopes)
     return total
 

@@ -21,9 +21,9 @@ STEP = 1e-4
 """Of the central differences, in logarithms and in scales of a set's own unknowns."""
 REACH = np.log(30.0)
 """Constants are looked for within a factor of 30 of where they start."""
-AGREED = 0.01
+CONVERGED = 0.01
 """Levels of noise that change by less are final."""
-ROUNDS = 6
+ITERATIONS = 6
 
 
 class FitModel(NamedTuple):
@@ -36,14 +36,14 @@ class FitModel(NamedTuple):
     @property
     def start(self) -> Floats:
         """(n_unknowns,) logarithms of the constants, then every set's own unknowns."""
-        own = [each.own_start for each in self.experiments]
-        return np.concatenate([self.begin.logs(self.names), *own])
+        nuisance = [each.nuisance_start for each in self.experiments]
+        return np.concatenate([self.begin.logs(self.names), *nuisance])
 
     @property
     def scale(self) -> Floats:
         """(n_unknowns,) of their changes."""
-        own = [each.own_scale for each in self.experiments]
-        return np.concatenate([np.ones(len(self.names)), *own])
+        nuisance = [each.nuisance_scale for each in self.experiments]
+        return np.concatenate([np.ones(len(self.names)), *nuisance])
 
     @property
     def set_of_row(self) -> np.ndarray:
@@ -58,9 +58,11 @@ class FitModel(NamedTuple):
         return self.begin.at(self.names, unknowns[: len(self.names)])
 
     @property
-    def own(self) -> list[slice]:
+    def nuisance(self) -> list[slice]:
         """Locates every set's own unknowns."""
-        ends = np.cumsum([len(self.names), *(len(each.own_start) for each in self.experiments)])
+        ends = np.cumsum(
+            [len(self.names), *(len(each.nuisance_start) for each in self.experiments)]
+        )
         return [slice(first, last) for first, last in pairwise(ends)]
 
     def predictions(self, unknowns: Floats) -> list[Floats]:
@@ -70,8 +72,8 @@ class FitModel(NamedTuple):
             SimulationError: there is no such state.
         """
         constants = self.constants(unknowns)
-        pairs = zip(self.experiments, self.own, strict=True)
-        return [each.predict(constants, unknowns[own]) for each, own in pairs]
+        pairs = zip(self.experiments, self.nuisance, strict=True)
+        return [each.predict(constants, unknowns[nuisance]) for each, nuisance in pairs]
 
     def residual(self, unknowns: Floats) -> Floats:
         """Computes whitened residuals (n,)."""
@@ -83,14 +85,14 @@ class FitModel(NamedTuple):
     def jacobian(self, unknowns: Floats) -> Floats:
         """Differentiates the whitened residuals by central differences (n, n_unknowns)."""
         blocks = []
-        for each, own in zip(self.experiments, self.own, strict=True):
-            seen = [k for k, name in enumerate(self.names) if name in each.sees]
+        for each, nuisance in zip(self.experiments, self.nuisance, strict=True):
+            seen = [k for k, name in enumerate(self.names) if name in each.depends_on]
             block = np.zeros((len(each.measured.values), len(unknowns)))
-            for k in (*seen, *range(own.start, own.stop)):
+            for k in (*seen, *range(nuisance.start, nuisance.stop)):
                 step = np.zeros_like(unknowns)
                 step[k] = STEP * self.scale[k]
                 ahead, behind = (
-                    each.predict(self.constants(at), at[own])
+                    each.predict(self.constants(at), at[nuisance])
                     for at in (unknowns + step, unknowns - step)
                 )
                 block[:, k] = (ahead - behind) / (2 * step[k])
@@ -109,8 +111,8 @@ class Fit(NamedTuple):
     bounds: Floats  # (n_unknowns, 2) within which it was looked for
 
 
-def fit_least_squares(model: FitModel, near: Floats | None = None) -> Fit:
-    """Finds the constants that fit best, from `near` on, or from the start.
+def fit_least_squares(model: FitModel, initial: Floats | None = None) -> Fit:
+    """Finds the constants that fit best, from `initial` on, or from the start.
 
     Levels of noise that are not known follow from the residuals of their sets, and weigh the sets
     against one another; they are found in turns with the constants.
@@ -119,16 +121,16 @@ def fit_least_squares(model: FitModel, near: Floats | None = None) -> Fit:
         SimulationError: the measured states cannot be simulated from the start on.
     """
     rows, begin = model.set_of_row, model.start
-    unknowns = begin if near is None else near
+    unknowns = begin if initial is None else initial
     reach = np.full(len(begin), np.inf)
     reach[: len(model.names)] = REACH
     bounds = np.stack([begin - reach, begin + reach], axis=1)
     level = _level(model, model.residual(unknowns), np.zeros((len(rows), 1)))
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         unknowns = _solve(model, unknowns, level[rows], bounds)
         residual, jacobian = model.residual(unknowns), model.jacobian(unknowns)
         found = _level(model, residual, jacobian / level[rows, None])
-        settled = np.ptp(np.log(found / level)) < AGREED
+        settled = np.ptp(np.log(found / level)) < CONVERGED
         level = found
         if settled:
             break

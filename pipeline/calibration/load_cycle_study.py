@@ -93,15 +93,15 @@ def follow_cycle(asked: LoadCycles, record: CycleRecord, folder: Path) -> CycleP
     solver = StaticSolver(fixed, steps[1:])
     state, _, found = solve_case(solver, values, drive)
 
-    def seen_at(loads: Floats, states: Floats) -> tuple[Observables, Floats]:
+    def observe_path(loads: Floats, states: Floats) -> tuple[Observables, Floats]:
         seen = observe(fixed, values, states.reshape(len(states), fixed.n_units, 3))
         slope = np.column_stack([np.interp(loads, steps, each) for each in along.T])
         return seen, -(seen.force_on(units_held[1]) * slope).sum(axis=1)
 
-    seen, tension = seen_at(steps[1:], state)
+    seen, tension = observe_path(steps[1:], state)
     past = trace_first_snap(solver, values, drive, found)
     loads, states = (found.snaps, found.states[:0]) if past is None else past[:2]
-    traced = np.interp(loads, steps, whole[:, 2]), seen_at(loads, states)[1]
+    traced = np.interp(loads, steps, whole[:, 2]), observe_path(loads, states)[1]
     return CyclePath(
         whole[1:, 2], tension, seen.strain_energy + seen.contact_energy, len(path) - 2,
         len(found.snaps), _reversals(fixed, values, state), np.column_stack(traced),
@@ -139,7 +139,9 @@ def measure_cycle(record: CycleRecord, folder: Path) -> MeasuredCycle:
     wanted = {record.columns.displacement: units.LENGTH, record.columns.force: units.FORCE}
     branches = load_cycles.split_branches(*csv_columns.read_quantities(path, wanted, 10).T)
     reach = max((np.ptp(each.displacement) for each in branches), default=0.0)
-    full = [each for each in branches if np.ptp(each.displacement) > load_cycles.WHOLE * reach]
+    full = [
+        each for each in branches if np.ptp(each.displacement) > load_cycles.LEAST_RANGE * reach
+    ]
     first = record.first == "kept" or len(full) < 4
     kept = full if first else full[2:]
     ways = [[each for each in kept if each.loading == rises] for rises in (True, False)]

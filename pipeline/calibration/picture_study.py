@@ -20,7 +20,7 @@ from sim.structure import Lattice
 DOFS = ("ux", "uy", "theta")
 
 
-class MovedPart(NamedTuple):
+class TrackedPart(NamedTuple):
     """Holds a part in a later picture, and its motion (3,) by the other program: px, px, rad."""
 
     frame: int
@@ -29,7 +29,7 @@ class MovedPart(NamedTuple):
     reference: Floats
 
 
-def moved_parts(asked: RigidParts, folder: Path) -> Iterator[MovedPart]:
+def tracked_parts(asked: RigidParts, folder: Path) -> Iterator[TrackedPart]:
     """Yields every part in every later picture that the other program tells of.
 
     Raises:
@@ -49,7 +49,7 @@ def moved_parts(asked: RigidParts, folder: Path) -> Iterator[MovedPart]:
         one = asked.parts[int(part)]
         before, after = read_pictures(place / asked.first, numbered[int(frame)])
         patch = Patch(before, after, np.array(one.outline), np.array(one.centre))
-        yield MovedPart(int(frame), int(part), patch, np.array(motion))
+        yield TrackedPart(int(frame), int(part), patch, np.array(motion))
 
 
 def numbered_pictures(folder: Path) -> dict[int, Path]:
@@ -72,18 +72,20 @@ def study_pictures(asked: KnownPictures, folder: Path) -> xr.Dataset:
     Raises:
         UserError: a file cannot be used, or the specimen is not found in its picture.
     """
-    return xr.merge([_tracked(asked.rigid_parts, folder), _located(asked.specimen, folder)])
+    return xr.merge(
+        [_track_parts(asked.rigid_parts, folder), _locate_specimen(asked.specimen, folder)]
+    )
 
 
-def _tracked(asked: RigidParts, folder: Path) -> xr.Dataset:
-    found = list(moved_parts(asked, folder))
+def _track_parts(asked: RigidParts, folder: Path) -> xr.Dataset:
+    found = list(tracked_parts(asked, folder))
     frames = sorted({each.frame for each in found})
     shape = (len(asked.parts), len(frames), len(DOFS))
     reference, measured = np.full(shape, np.nan), np.full(shape, np.nan)
     for each in found:
         place = each.part, frames.index(each.frame)
         reference[place] = each.reference
-        measured[place] = follow_patch(each.patch, whole=True)
+        measured[place] = follow_patch(each.patch, include_edge=True)
     along = ("part", "frame", "dof")
     return xr.Dataset(
         {"reference": (along, reference), "measured": (along, measured)},
@@ -91,7 +93,7 @@ def _tracked(asked: RigidParts, folder: Path) -> xr.Dataset:
     )
 
 
-def _located(asked: SpecimenPicture, folder: Path) -> xr.Dataset:
+def _locate_specimen(asked: SpecimenPicture, folder: Path) -> xr.Dataset:
     network = asked.lattice.network()
     shown = _outlines(network)
     path = folder / asked.file

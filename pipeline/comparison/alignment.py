@@ -21,19 +21,19 @@ LEAST_CORRELATION = 0.9
 MOTION, LOADING, UNLOADING = range(3)
 
 _LEAST_OVERLAP = 0.5  # of the shorter course
-_PER_FRAME = 2  # lags tried
-_STEPS = 12  # of refinement
-_NEAR = 0.1  # of the correlation: lags that a finer look may find to be the best
-_LIKELY = 9.0  # times the variance, what three standard deviations add: a lag as good
-_ALIKE = 1e-4  # of the mean square: courses that differ by less are the same
-_BEYOND = 0.005  # of the nominal range: still its end
+_LAGS_PER_FRAME = 2  # lags tried
+_REFINEMENTS = 12  # pairs of golden sections
+_CORRELATION_MARGIN = 0.1  # of the correlation: lags that a finer look may find to be the best
+_VARIANCES = 9.0  # times the variance, what three standard deviations add: a lag as good
+_SAME = 1e-4  # of the mean square: courses that differ by less are the same
+_END_MARGIN = 0.005  # of the nominal range: still its end
 _LEAST_RANGE = 0.05  # of the nominal range: a drive that moves
-_DENSER = 20  # samples of a path that is inverted, for each of its own
-_STILL = 0.1  # of the mean speed: neither way
+_OVERSAMPLING = 20  # samples of a path that is inverted, for each of its own
+_SPEED_SHARE = 0.1  # of the mean speed: neither way
 
 
 class Lag(NamedTuple):
-    """Tells the start of the nominal course on the clock of the measured one."""
+    """Holds the lag of the measured history behind the nominal one."""
 
     value: float  # s
     sigma: float  # its standard uncertainty, from what the fit leaves and how that is correlated, s
@@ -90,7 +90,7 @@ def find_lag(measured: SampledMotion, nominal: SampledMotion) -> Lag:
             key="frame_rate",
             remedy="give the recording the rate at which they were taken, and track it again",
         )
-    lag, ambiguous = _best(held, nominal)
+    lag, ambiguous = _search_lag(held, nominal)
     correlation = _correlation(held, nominal, lag)
     if correlation < LEAST_CORRELATION:
         raise UserError(
@@ -114,36 +114,38 @@ def too_few_frames(frames: int) -> UserError:
     )
 
 
-def _lags(measured: SampledMotion, nominal: SampledMotion) -> Floats:
+def _candidate_lags(measured: SampledMotion, nominal: SampledMotion) -> Floats:
     """Lists lags (s) at which the courses overlap enough."""
     interval = float(np.median(np.diff(measured.time)))
     span, length = np.ptp(measured.time), np.ptp(nominal.time)
     least = _LEAST_OVERLAP * min(span, length)
     first = measured.time[0] + least - nominal.time[-1]
     last = measured.time[-1] - least - nominal.time[0]
-    return np.arange(first, last, interval / _PER_FRAME)
+    return np.arange(first, last, interval / _LAGS_PER_FRAME)
 
 
-def _best(measured: SampledMotion, nominal: SampledMotion) -> tuple[float, bool]:
+def _search_lag(measured: SampledMotion, nominal: SampledMotion) -> tuple[float, bool]:
     """Finds the lag, s, and whether others are as good, of which it is the nearest to none.
 
     As good are those whose residual exceeds that of the best by no more than noise allows.
     """
-    tried = _lags(measured, nominal)
+    tried = _candidate_lags(measured, nominal)
     found = np.array([_correlation(measured, nominal, lag) for lag in tried])
     inner = np.concatenate([[-np.inf], found, [-np.inf]])
     peak = np.flatnonzero((found >= inner[:-2]) & (found >= inner[2:]))
-    near = peak[found[peak] > found.max() - _NEAR]
-    lags = np.array([_refined(measured, nominal, lag) for lag in tried[near]])
+    near = peak[found[peak] > found.max() - _CORRELATION_MARGIN]
+    lags = np.array([_refine_peak(measured, nominal, lag) for lag in tried[near]])
     left = np.array([1 - _correlation(measured, nominal, lag) ** 2 for lag in lags])
-    rest, _ = _residual(measured, nominal, lags[left.argmin()])
-    allowed = left.min() * (1 + _LIKELY * _inflation(rest) / rest.size)
-    good = lags[left <= np.fmax(allowed, left.min() + _ALIKE)]
+    residual, _ = _residual(measured, nominal, lags[left.argmin()])
+    allowed = left.min() * (1 + _VARIANCES * _variance_inflation(residual) / residual.size)
+    good = lags[left <= np.fmax(allowed, left.min() + _SAME)]
     nearest = good[np.argmin(np.abs(good))]
     return float(nearest), bool(np.ptp(good) > np.ptp(tried[:2]))
 
 
-def _pair(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[Floats, Floats]:
+def _common_samples(
+    measured: SampledMotion, nominal: SampledMotion, lag: float
+) -> tuple[Floats, Floats]:
     """Samples both courses at the frames where both are known, less their means."""
     there = nominal.at(measured.time - lag)
     both = np.isfinite(there).all(axis=1)
@@ -166,12 +168,12 @@ def _correlation(measured: SampledMotion, nominal: SampledMotion, lag: float) ->
     return float(product / size) if size > 0 else 0.0
 
 
-def _refined(measured: SampledMotion, nominal: SampledMotion, lag: float) -> float:
+def _refine_peak(measured: SampledMotion, nominal: SampledMotion, lag: float) -> float:
     """Refines the peak of the correlation, by golden section within a frame either way."""
     interval = float(np.median(np.diff(measured.time)))
-    low, high = lag - interval / _PER_FRAME, lag + interval / _PER_FRAME
+    low, high = lag - interval / _LAGS_PER_FRAME, lag + interval / _LAGS_PER_FRAME
     share = (np.sqrt(5) - 1) / 2
-    for _ in range(2 * _STEPS):
+    for _ in range(2 * _REFINEMENTS):
         left, right = high - share * (high - low), low + share * (high - low)
         if _correlation(measured, nominal, left) > _correlation(measured, nominal, right):
             high = right
@@ -183,27 +185,27 @@ def _refined(measured: SampledMotion, nominal: SampledMotion, lag: float) -> flo
 def _fit(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[float, float, float]:
     """Fits the lag's uncertainty, the gain and its uncertainty, by least squares about the lag."""
     step = 1e-3 * float(np.median(np.diff(measured.time)))
-    _, last = _pair(measured, nominal, lag)
+    _, last = _common_samples(measured, nominal, lag)
     sooner, later = (nominal.at(measured.time - lag + shift) for shift in (step, -step))
-    rest, gain = _residual(measured, nominal, lag)
-    variance = float(np.mean(rest**2)) * _inflation(rest)
+    residual, gain = _residual(measured, nominal, lag)
+    variance = float(np.mean(residual**2)) * _variance_inflation(residual)
     steep = float(np.nansum((gain * (sooner - later) / (2 * step)) ** 2))
     return np.sqrt(variance / steep), gain, np.sqrt(variance / float(np.sum(last**2)))
 
 
 def _residual(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[Floats, float]:
     """Computes what a gain on the nominal course leaves (frames, channels), and the gain."""
-    first, last = _pair(measured, nominal, lag)
+    first, last = _common_samples(measured, nominal, lag)
     gain = float(np.sum(first * last) / np.sum(last**2))
     return first - gain * last, gain
 
 
-def _inflation(rest: Floats) -> float:
-    """Computes by how much correlated residuals (frames, channels) tell less than independent."""
-    size = float(np.sum(rest**2))
-    alike = float(np.sum(rest[1:] * rest[:-1])) / size if size > 0 else 0.0
-    alike = float(np.clip(alike, 0.0, 0.99))
-    return (1 + alike) / (1 - alike)
+def _variance_inflation(residual: Floats) -> float:
+    """Computes the variance inflation by correlated residuals (frames, channels), of AR(1)."""
+    size = float(np.sum(residual**2))
+    autocorrelation = float(np.sum(residual[1:] * residual[:-1])) / size if size > 0 else 0.0
+    autocorrelation = float(np.clip(autocorrelation, 0.0, 0.99))
+    return (1 + autocorrelation) / (1 - autocorrelation)
 
 
 def find_load_time(measured: Floats, nominal: SampledMotion) -> Floats:
@@ -229,26 +231,26 @@ def find_load_time(measured: Floats, nominal: SampledMotion) -> Floats:
             f" drive's direction, where the problem moves them by {span:.3g} mm",
             remedy="check `turned` and `mirrored` of the recording, and its window",
         )
-    margin = _BEYOND * span
+    margin = _END_MARGIN * span
     inside = (measured >= course[0] - margin) & (measured <= course[-1] + margin)
-    dense = np.linspace(nominal.time[0], nominal.time[-1], _DENSER * len(course))
+    dense = np.linspace(nominal.time[0], nominal.time[-1], _OVERSAMPLING * len(course))
     finer = np.maximum.accumulate(nominal.at(dense)[:, 0])
     return np.where(inside, np.interp(measured, finer, dense), np.nan)
 
 
 def find_branches(measured: Floats) -> NDArray[np.int8]:
-    """Tells growing from falling load (frames,); while it rests, as before."""
-    course = _filled(measured)
+    """Classifies load (frames,) as growing or falling; at rest, as before."""
+    course = _fill_gaps(measured)
     width = max(len(course) // 40, 1)
     kernel = np.ones(2 * width + 1) / (2 * width + 1)
     speed = np.convolve(np.gradient(np.pad(course, 2 * width, mode="edge")), kernel, mode="same")
     speed = speed[2 * width : 2 * width + len(course)]
-    way = np.where(np.abs(speed) < _STILL * np.abs(speed).mean(), 0.0, np.sign(speed))
+    way = np.where(np.abs(speed) < _SPEED_SHARE * np.abs(speed).mean(), 0.0, np.sign(speed))
     last = np.maximum.accumulate(np.where(way != 0, np.arange(len(way)), 0))
     return np.where(way[last] < 0, UNLOADING, LOADING).astype(np.int8)
 
 
-def _filled(values: Floats) -> Floats:
+def _fill_gaps(values: Floats) -> Floats:
     seen = np.flatnonzero(np.isfinite(values))
     return np.interp(np.arange(len(values)), seen, values[seen])
 

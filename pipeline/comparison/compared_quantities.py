@@ -12,7 +12,7 @@ from pipeline.comparison.nominal_side import interpolate_response
 from pipeline.problem import Problem
 from sim.core import Floats, Ints, Mask
 
-FOLLOWED = ("mean_rotation", "mean_displacement", "contraction", "mimicking_error")
+TRACKED_QUANTITIES = ("mean_rotation", "mean_displacement", "contraction", "mimicking_error")
 """Names in the dataset."""
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.comparison import curves
-from pipeline.comparison.compared_quantities import FOLLOWED, Quantity, known_mean
+from pipeline.comparison.compared_quantities import TRACKED_QUANTITIES, Quantity, known_mean
 from pipeline.comparison.curves import Sides
 from pipeline.comparison.measured_side import Measurement
 from pipeline.comparison.metrics import COPIES, LEVEL, METRICS, Pair, estimate_metrics
@@ -165,7 +165,7 @@ def _curves(made: Compared, random: np.random.Generator) -> Variables:
         name: curves.quantity_curve(sides, smooth, made.quantities[name], random)
         if name in made.quantities
         else nothing
-        for name in FOLLOWED
+        for name in TRACKED_QUANTITIES
     }
     return {
         **{name: (along, values) for name, values in followed.items()},

@@ -11,10 +11,10 @@ from pipeline.comparison.metrics import COPIES, LEVEL, interval_ends
 from pipeline.comparison.redrive import fit_spline
 from sim.core import Floats
 
-_SPREAD = float(ndtri((1 + LEVEL) / 2))
+_SIGMAS = float(ndtri((1 + LEVEL) / 2))
 """Standard deviations at the ends of an interval."""
 _TRIALS = 50
-_SEEN = 0.9  # of the frames, or a unit's peak may have been missed
+_SEEN_SHARE = 0.9  # of the frames, or a unit's peak may have been missed
 
 
 class Sides(NamedTuple):
@@ -86,12 +86,12 @@ def peak_to_peak(motion: Floats) -> Floats:
     The extremes are those of parabolas through the extreme frames and their neighbours: a peak
     between two frames is not missed.
     """
-    enough = np.isfinite(motion).mean(axis=-3) >= _SEEN
-    span = _highest(motion) + _highest(-motion)
+    enough = np.isfinite(motion).mean(axis=-3) >= _SEEN_SHARE
+    span = _interpolated_peak(motion) + _interpolated_peak(-motion)
     return np.where(enough, span, np.nan)
 
 
-def _highest(motion: Floats) -> Floats:
+def _interpolated_peak(motion: Floats) -> Floats:
     values = np.where(np.isfinite(motion), motion, -np.inf)
     at = values.argmax(axis=-3, keepdims=True)
     near = [np.clip(at + step, 0, motion.shape[-3] - 1) for step in (-1, 0, 1)]
@@ -113,15 +113,15 @@ def estimate_peaks(sides: Sides, smooth: Floats, random: np.random.Generator) ->
     for place, motion in enumerate(sides.motions):
         out[place, ..., 0] = peak_to_peak(motion)
     known = np.isfinite(sides.measured)
-    ends = [np.where(known, way * sides.measured, -np.inf).argmax(axis=0) for way in (-1, 1)]
+    ends = [np.where(known, sign * sides.measured, -np.inf).argmax(axis=0) for sign in (-1, 1)]
     sigma = np.hypot(*(np.take_along_axis(sides.sigma, end[None], axis=0)[0] for end in ends))
-    middle = out[0, ..., 0] - _added_by_noise(sides, smooth, random)
-    out[0, ..., 1], out[0, ..., 2] = (middle + sign * _SPREAD * sigma for sign in (-1, 1))
+    middle = out[0, ..., 0] - _noise_bias(sides, smooth, random)
+    out[0, ..., 1], out[0, ..., 2] = (middle + sign * _SIGMAS * sigma for sign in (-1, 1))
     out[1, ..., 1:] = np.moveaxis(sides.within(peak_to_peak(sides.copies))[::2], 0, -1)
     return out
 
 
-def _added_by_noise(sides: Sides, smooth: Floats, random: np.random.Generator) -> Floats:
+def _noise_bias(sides: Sides, smooth: Floats, random: np.random.Generator) -> Floats:
     """Estimates how much (units, dofs) noise adds to peak to peak: that of the smoothed motion."""
     still, added = peak_to_peak(smooth), np.zeros(smooth.shape[1:])
     for _ in range(_TRIALS):
@@ -134,9 +134,9 @@ def smooth_motion(sides: Sides) -> Floats:
     """Smooths the measured motion; NaN for units that are seldom seen."""
     out = np.full_like(sides.measured, np.nan)
     frames = np.arange(len(out), dtype=np.float64)
-    there = np.isfinite(sides.measured + sides.sigma)
-    for unit, dof in np.argwhere(there.mean(axis=0) >= _SEEN):
-        known = there[:, unit, dof]
+    observed = np.isfinite(sides.measured + sides.sigma)
+    for unit, dof in np.argwhere(observed.mean(axis=0) >= _SEEN_SHARE):
+        known = observed[:, unit, dof]
         course, sigma = (each[known, unit, dof] for each in (sides.measured, sides.sigma))
         out[known, unit, dof] = fit_spline(frames[known], course, sigma)(frames[known])
     return out

@@ -19,10 +19,10 @@ MOST_FRAMES = 600
 LEAST_PER_PERIOD = 8
 COMPARED, HELD, PUSHED, ABSENT, LOST = range(5)
 
-_TARED = 0.05  # of the range of forces, by which one at rest may differ from zero
-_NOISY = 4.0  # standard deviations, likewise
+_ZERO_SHARE = 0.05  # of the range of forces, by which one at rest may differ from zero
+_NOISE_RATIO = 4.0  # standard deviations, likewise
 _NORMAL = 0.6745  # median of absolute normal numbers
-_SEEN = 0.5  # of the frames, or a unit counts as lost
+_SEEN_SHARE = 0.5  # of the frames, or a unit counts as lost
 
 
 class Measurement(NamedTuple):
@@ -41,10 +41,10 @@ class Measurement(NamedTuple):
 
     @property
     def compared(self) -> Mask:
-        """Tells the units (n_units,) that are compared."""
+        """Marks the units (n_units,) that are compared."""
         return np.asarray(self.use == COMPARED)
 
-    def taken(self, kept: Ints) -> "Measurement":
+    def select(self, kept: Ints) -> "Measurement":
         """Selects frames (n,) of those that are compared."""
         displacement = self.displacement[kept]
         return self._replace(
@@ -52,7 +52,7 @@ class Measurement(NamedTuple):
             time=self.time[kept],
             displacement=displacement,
             sigma=self.sigma[kept],
-            use=_lose(displacement, np.where(self.use == LOST, COMPARED, self.use)),
+            use=_mark_lost(displacement, np.where(self.use == LOST, COMPARED, self.use)),
             drive=self.drive[kept],
             force=self.force[kept],
         )
@@ -83,7 +83,7 @@ def prepare_measurement(
         time=shown["time"].values,
         displacement=displacement,
         sigma=shown["sigma"].values.astype(float),
-        use=_lose(displacement, _roles(design)),
+        use=_mark_lost(displacement, _unit_use(design)),
         centre=centre,
         registration=found,
         track=turned,
@@ -99,9 +99,9 @@ def check_track(track: xr.Dataset, design: xr.Dataset, leading: Ints | None = No
         UserError: telling which.
     """
     if not np.array_equal(track["unit"].values, design["unit"].values):
-        raise _another(f"it has {track.sizes['unit']} units, the design {design.sizes['unit']}")
+        raise _mismatch(f"it has {track.sizes['unit']} units, the design {design.sizes['unit']}")
     if told := difference_of_vertices(track["vertices"].values, design["vertices"].values):
-        raise _another(told)
+        raise _mismatch(told)
     seen = np.isfinite(track["displacement"].values[:, driven_units(design, leading), 0]).any(
         axis=1
     )
@@ -121,20 +121,22 @@ def untared_force(force: Floats, resting: Mask) -> float:
     known = np.isfinite(force)
     if not (known & resting).any():
         return np.nan
-    still = force[known & resting]
-    least = max(_TARED * float(np.ptp(force[known])), _NOISY * _noise(still, force[known]))
-    found = float(np.median(still))
+    at_rest = force[known & resting]
+    least = max(
+        _ZERO_SHARE * float(np.ptp(force[known])), _NOISE_RATIO * _noise(at_rest, force[known])
+    )
+    found = float(np.median(at_rest))
     return found if abs(found) > least else np.nan
 
 
-def _noise(still: Floats, whole: Floats) -> float:
+def _noise(at_rest: Floats, all_readings: Floats) -> float:
     """Estimates a force's standard deviation by second differences: at rest, if it is so long."""
-    taken = still if len(still) >= LEAST_FRAMES else whole
-    bends = np.abs(np.diff(taken, 2))
+    readings = at_rest if len(at_rest) >= LEAST_FRAMES else all_readings
+    bends = np.abs(np.diff(readings, 2))
     return float(np.median(bends)) / (_NORMAL * math.sqrt(6.0)) if len(bends) else 0.0
 
 
-def _another(why: str) -> UserError:
+def _mismatch(why: str) -> UserError:
     return UserError(
         f"the track is not of this study's design: {why}",
         key="design",
@@ -177,19 +179,19 @@ def _centres(design: xr.Dataset) -> Floats:
     return out
 
 
-def _roles(design: xr.Dataset) -> NDArray[np.int8]:
-    """Tells the use (units,) of units that are all seen."""
+def _unit_use(design: xr.Dataset) -> NDArray[np.int8]:
+    """Classifies the use (units,) of units as if all were seen."""
     support = design["support"].values
     absent = np.isnan(design["vertices"].values[:, 0, 0])
     conditions = [absent, support == CLAMPED, support == DRIVEN]
     return np.asarray(np.select(conditions, [ABSENT, HELD, PUSHED], COMPARED), dtype=np.int8)
 
 
-def _lose(motion: Floats, role: NDArray[np.int8]) -> NDArray[np.int8]:
-    """Marks as lost those that would be compared but for being seldom seen."""
-    return np.where((role == COMPARED) & ~often_seen(motion), LOST, role).astype(np.int8)
+def _mark_lost(motion: Floats, use: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Marks as lost the units to be compared that are seldom seen."""
+    return np.where((use == COMPARED) & ~often_seen(motion), LOST, use).astype(np.int8)
 
 
 def often_seen(motion: Floats) -> Mask:
-    """Tells the units (units,) whose motion (frames, units, 3) is known in enough of the frames."""
-    return np.asarray(np.isfinite(motion).all(axis=2).mean(axis=0) >= _SEEN)
+    """Marks the units (units,) whose motion (frames, units, 3) is known in enough of the frames."""
+    return np.asarray(np.isfinite(motion).all(axis=2).mean(axis=0) >= _SEEN_SHARE)

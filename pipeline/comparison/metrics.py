@@ -16,7 +16,7 @@ COPIES = 300
 LEVEL = 0.95
 METRICS = ("rmse", "nrmse", "correlation", "noise_share", "time_shift")
 
-_LONGEST = 4  # blocks in a recording, at least
+_LEAST_BLOCKS = 4  # blocks in a recording, at least
 _STEPS = 6
 
 
@@ -29,13 +29,13 @@ class Pair(NamedTuple):
     slope: Floats | None = None  # (frames, units, dofs) rate of the simulated, per s
     added: bool = False  # whether noise of that uncertainty was added once more
 
-    def taken(self, frames: Ints, units: Ints) -> "Pair":
+    def resample(self, frames: Ints, units: Ints) -> "Pair":
         """Selects frames and units by number, which may come more than once."""
         chosen = np.ix_(frames, units)
         slope = None if self.slope is None else self.slope[chosen]
         return Pair(self.measured[chosen], self.simulated[chosen], self.sigma[chosen], slope)
 
-    def noisier(self, random: np.random.Generator) -> "Pair":
+    def with_noise(self, random: np.random.Generator) -> "Pair":
         """Adds noise to the measured side."""
         noise = random.standard_normal(self.measured.shape) * np.nan_to_num(self.sigma)
         return self._replace(measured=self.measured + noise, added=True)
@@ -60,7 +60,7 @@ def compute_metrics(pair: Pair) -> Floats:
             np.sqrt(mean.residual / mean.measured),
             mean.correlation,
             mean.noise / mean.residual,
-            _shift(pair),
+            _time_shift(pair),
         ]
     return np.where(np.isfinite(rows), rows, np.nan)
 
@@ -82,9 +82,9 @@ def _moments(pair: Pair) -> _Moments:
         variance = np.maximum(square - first**2 - extra, 0.0)
         spread = mean(simulated, simulated) - last**2
         product = mean(measured, simulated) - first * last
-        alike = product / np.sqrt(variance * spread)
+        correlation = product / np.sqrt(variance * spread)
         residual = np.maximum(mean(apart, apart) - extra, 0.0)
-    return _Moments(residual, square - extra, variance, noise, alike)
+    return _Moments(residual, square - extra, variance, noise, correlation)
 
 
 def _sum(*factors: Floats) -> Floats:
@@ -92,7 +92,7 @@ def _sum(*factors: Floats) -> Floats:
     return np.asarray(np.einsum(f"{','.join(['fud'] * len(factors))}->d", *factors))
 
 
-def _shift(pair: Pair) -> Floats:
+def _time_shift(pair: Pair) -> Floats:
     """Computes the delay (dofs,) of the measured side, s, to first order in it."""
     if pair.slope is None:
         return np.full(pair.measured.shape[-1], np.nan)
@@ -108,11 +108,11 @@ def align_in_time(pair: Pair, time: Floats) -> tuple[Pair, Floats]:
 
     `time` (frames,) is in s. The shift is NaN where the sides are so unlike that none is found.
     """
-    most = float(np.ptp(time)) / _LONGEST
+    most = float(np.ptp(time)) / _LEAST_BLOCKS
     total = np.zeros(pair.measured.shape[-1])
     moved = _delay(pair, time, total)
     for _ in range(_STEPS):
-        total = np.clip(total + np.nan_to_num(_shift(moved)), -most, most)
+        total = np.clip(total + np.nan_to_num(_time_shift(moved)), -most, most)
         moved = _delay(pair, time, total)
     return moved, np.where(np.abs(total) < most, total, np.nan)
 
@@ -140,7 +140,7 @@ def estimate_metrics(pair: Pair, time: Floats | None, random: np.random.Generato
     if time is None:
         return found
     late, total = align_in_time(pair, time)
-    shift = bootstrap(late, lambda copy: _shift(copy)[None], random)[:, 0]
+    shift = bootstrap(late, lambda copy: _time_shift(copy)[None], random)[:, 0]
     found[:, METRICS.index("time_shift")] = total + shift - shift[0]
     return found
 
@@ -154,7 +154,7 @@ def bootstrap(
 
     def copy() -> Pair:
         drawn = np.asarray(random.integers(units, size=units))
-        return pair.taken(_blocks(frames, length, random), drawn).noisier(random)
+        return pair.resample(_blocks(frames, length, random), drawn).with_noise(random)
 
     copies = [statistic(copy()) for _ in range(COPIES)]
     return np.concatenate([statistic(pair)[None], interval_ends(np.array(copies))])
@@ -172,7 +172,7 @@ def interval_ends(copies: Floats) -> Floats:
 def block_length(residual: Floats) -> int:
     """Computes a block's frames: until residuals (frames, ...) forget, at most a quarter."""
     flat = np.nan_to_num(residual.reshape(len(residual), -1))
-    most = max(len(flat) // _LONGEST, 1)
+    most = max(len(flat) // _LEAST_BLOCKS, 1)
     size = float(np.sum(flat**2))
     for lag in range(1, most):
         if float(np.sum(flat[lag:] * flat[:-lag])) < size / np.e:

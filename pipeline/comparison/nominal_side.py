@@ -14,7 +14,7 @@ from sim.core import Floats, Ints, Mask
 
 BOTH: Mask = np.ones(2, dtype=bool)
 """A drive that displaces its units along x and y."""
-_HARDLY = 0.01  # of the greatest load: none yet
+_LOAD_SHARE = 0.01  # of the greatest load: none yet
 
 
 class ComparisonAxis(NamedTuple):
@@ -26,12 +26,12 @@ class ComparisonAxis(NamedTuple):
     turn: float  # direction of the measured less that of the nominal drive, rad
 
     @property
-    def resting(self) -> Mask:
-        """Tells the first frames (frames,), which the drive has not reached yet."""
-        begun = self.time > (_HARDLY * np.nanmax(self.time) if self.lag is None else 0.0)
+    def at_rest(self) -> Mask:
+        """Marks the first frames (frames,), before the drive begins."""
+        begun = self.time > (_LOAD_SHARE * np.nanmax(self.time) if self.lag is None else 0.0)
         return np.isfinite(self.time) & ~np.logical_or.accumulate(begun)
 
-    def taken(self, kept: Ints) -> "ComparisonAxis":
+    def select(self, kept: Ints) -> "ComparisonAxis":
         """Selects frames (n,) by number."""
         return self._replace(time=self.time[kept], branch=self.branch[kept])
 
@@ -73,18 +73,18 @@ def find_axis(
     held = np.where(moved, drive, 0.0)  # what slides tells of the specimen, not of the drive
     if not static:
         lag = alignment.find_lag(SampledMotion(time, held), nominal)
-        turn = _turn(held, nominal.at(time - lag.value), moved)
+        turn = _drive_turn(held, nominal.at(time - lag.value), moved)
         still = np.full(len(time), alignment.MOTION, dtype=np.int8)
         shown = np.where(time - lag.value <= nominal.time[-1], time - lag.value, np.nan)
         return ComparisonAxis(shown, still, lag, turn)
     way = drive_direction(response)
     pushed = SampledMotion(nominal.time, (nominal.value @ way)[:, None])
     shown = alignment.find_load_time(held @ way, pushed)
-    turn = _turn(held, nominal.at(shown), moved)
+    turn = _drive_turn(held, nominal.at(shown), moved)
     return ComparisonAxis(shown, alignment.find_branches(held @ way), None, turn)
 
 
-def _turn(held: Floats, nominal: Floats, moved: Mask) -> float:
+def _drive_turn(held: Floats, nominal: Floats, moved: Mask) -> float:
     """Computes by how much the drive was turned, rad; NaN where it does not hold both ways."""
     return alignment.drive_turn(held, nominal) if moved.all() else np.nan
 
@@ -98,7 +98,7 @@ def interpolate_response(response: xr.Dataset, time: Floats) -> NominalSide:
     known = np.isfinite(time)
     at = np.clip(time[known], samples[0], samples[-1])
 
-    def course(values: Floats) -> Floats:
+    def interpolate(values: Floats) -> Floats:
         out = np.full((len(time), *values.shape[1:]), np.nan)
         out[known] = CubicSpline(samples, values)(at)
         return out
@@ -106,9 +106,9 @@ def interpolate_response(response: xr.Dataset, time: Floats) -> NominalSide:
     motion = response["displacement"].transpose("time", "unit", "dof").values
     present = np.isfinite(motion[0, :, 0])
     displacement = np.full((len(time), *motion.shape[1:]), np.nan)
-    displacement[:, present] = course(motion[:, present])
-    drive = course(response["drive_displacement"].transpose("time", "xy").values)
-    force = course(
+    displacement[:, present] = interpolate(motion[:, present])
+    drive = interpolate(response["drive_displacement"].transpose("time", "xy").values)
+    force = interpolate(
         response["drive_force"].transpose("time", "xy").values @ drive_direction(response)
     )
     return NominalSide(displacement, drive, force)

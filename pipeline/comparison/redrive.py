@@ -23,7 +23,7 @@ from sim.solvers import PrescribedMotion
 
 FINER = 2
 """Instants that the filtered motion is kept at, for every frame."""
-LEAST_SEEN = 8
+LEAST_FRAMES = 8
 """Frames in which a unit must be seen to be followed."""
 
 
@@ -85,8 +85,8 @@ def filter_held_motion(track: xr.Dataset, scene: Scene) -> HeldMotion:
         for name in ("displacement", "sigma")
     )
     time = seen["time"].values - track["time"].values[0]
-    there = np.isfinite(measured).all(axis=2) & np.isfinite(sigma).all(axis=2)
-    assumed = there.sum(axis=0) < LEAST_SEEN
+    observed = np.isfinite(measured).all(axis=2) & np.isfinite(sigma).all(axis=2)
+    assumed = observed.sum(axis=0) < LEAST_FRAMES
     if assumed[driven].all():
         what = "no driven unit was seen, so the simulation cannot be driven as the specimen was"
         raise UserError(what, remedy="film it so that the units at the drive are in the picture")
@@ -96,7 +96,7 @@ def filter_held_motion(track: xr.Dataset, scene: Scene) -> HeldMotion:
     noise = np.zeros((len(unit), 3))
     for place, dof in np.ndindex(noise.shape):
         if not assumed[place]:
-            kept = there[:, place]
+            kept = observed[:, place]
             spline = fit_spline(time[kept], measured[kept, place, dof], sigma[kept, place, dof])
             value[:, place, dof] = spline(instants)
             slope[:, place, dof] = spline(instants, 1)
@@ -106,12 +106,12 @@ def filter_held_motion(track: xr.Dataset, scene: Scene) -> HeldMotion:
     for course in (value, slope):
         course[:, driven & assumed] = course[:, mean].mean(axis=1, keepdims=True)
     return HeldMotion(
-        unit, driven, HermiteMotion(step, value, slope), noise, 1 - there.mean(axis=0), assumed
+        unit, driven, HermiteMotion(step, value, slope), noise, 1 - observed.mean(axis=0), assumed
     )
 
 
 def held_units(scene: Scene) -> tuple[Ints, Mask]:
-    """Places of the driven units and of those clamped in all dofs, and which of them are driven."""
+    """Finds the driven units and those clamped in all dofs, and marks which are driven."""
     clamped, count = np.unique(scene.loads.clamped // 3, return_counts=True)
     unit = np.union1d(clamped[count == 3], scene.loads.driven)
     return unit, np.isin(unit, scene.loads.driven)
@@ -123,7 +123,7 @@ def fit_spline(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
 
 
 def drive_as_measured(scene: Scene, held: HeldMotion) -> Scene:
-    """The scene with all held units driven as measured; its end is that of the measurement.
+    """Drives all held units of a scene as measured, up to the end of the measurement.
 
     What clamps them is left out, in place of which their measured motion stands.
     """

@@ -33,7 +33,9 @@ class Registration(NamedTuple):
         return np.concatenate([turned, motion[..., 2:]], axis=-1)
 
 
-UNKNOWN = Registration(0.0, np.full(2, np.nan), np.nan, np.nan, np.full(2, np.nan), np.nan, np.nan)
+UNREGISTERED = Registration(
+    0.0, np.full(2, np.nan), np.nan, np.nan, np.full(2, np.nan), np.nan, np.nan
+)
 """Of a track that does not tell where its units were at rest."""
 
 
@@ -41,7 +43,7 @@ def register(design: Floats, measured: Floats) -> Registration:
     """Fits a similarity (least squares) between places (units, 2) in mm; NaN: unknown."""
     known = np.isfinite(design).all(axis=1) & np.isfinite(measured).all(axis=1)
     if known.sum() < _LEAST:
-        return UNKNOWN
+        return UNREGISTERED
     middle = design[known].mean(axis=0)
     before, after = _complex(design[known] - middle), _complex(measured[known] - middle)
     shift = after.mean()

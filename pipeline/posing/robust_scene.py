@@ -20,7 +20,7 @@ from pipeline.problem.sections import (
 )
 from sim.load_family import LoadFamily, LoadSetup, polar
 from sim.scene import DIRECTED, Scene
-from sim.solvers import MotionLaw, Together
+from sim.solvers import MotionLaw, Superposition
 from sim.structure import Perturbation, draw_copies
 
 _ALIKE = ("amplitude", "frequency")
@@ -74,7 +74,7 @@ def load_family(asked: Problem, folder: Path) -> LoadFamily | None:
 
 def _setup(asked: Problem, ranges: LoadRanges | TestSetup, folder: Path) -> LoadSetup:
     """Reads the loads in ranges under a problem's own drive, or two at once."""
-    motions = [m for m in motions_of(asked, folder) if isinstance(m, DIRECTED | Together)]
+    motions = [m for m in motions_of(asked, folder) if isinstance(m, DIRECTED | Superposition)]
     directions, amplitudes = zip(*map(polar, motions), strict=True)
     own = None if asked.frequency is None else (asked.frequency, asked.frequency)
     return LoadSetup(

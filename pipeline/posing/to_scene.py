@@ -299,7 +299,7 @@ def motions_of(problem: Problem, folder: Path) -> tuple[loads.MotionLaw, ...]:
         shares[rows, k] = 1.0 / np.count_nonzero(rows) if loads_them else 1.0
         found = _motions(drive, problem.horizon_time, folder)
         motions.append(found * count if len(found) == 1 else found)
-    return tuple(loads.Together(each, shares) for each in zip(*motions, strict=True))
+    return tuple(loads.Superposition(each, shares) for each in zip(*motions, strict=True))
 
 
 def _motions(drive: SingleDrive, horizon: float, folder: Path) -> tuple[loads.MotionLaw, ...]:

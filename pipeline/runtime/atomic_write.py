@@ -10,7 +10,7 @@ import psutil
 
 from pipeline.runtime.errors import UserError, refusal
 
-_HEAD = 4096  # bytes of a file that hold the words by which its writer knows it
+_HEAD_BYTES = 4096  # bytes of a file that hold the words by which its writer knows it
 
 
 def sidecar_path(
@@ -47,7 +47,7 @@ def begins_with(words: str) -> Callable[[Path], bool]:
     def test(path: Path) -> bool:
         try:
             with path.open("rb") as file:
-                return words.encode() in file.read(_HEAD)
+                return words.encode() in file.read(_HEAD_BYTES)
         except OSError as error:
             raise refusal(path, error) from error
 
@@ -66,7 +66,7 @@ def write_atomically(path: Path) -> Iterator[Path]:
     aside = path.with_name(f".part_{os.getpid()}_{path.name}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _clear(path)
+        _remove_leftovers(path)
         yield aside
         sync(aside)
         aside.replace(path)
@@ -110,7 +110,7 @@ def sync(path: Path) -> None:
         os.close(handle)
 
 
-def _clear(path: Path) -> None:
+def _remove_leftovers(path: Path) -> None:
     """Removes what a process that was killed left of the file."""
     name = path.name.replace("[", "[[]")  # a pattern that matches the name alone
     for left in path.parent.glob(f".part_*_{name}"):

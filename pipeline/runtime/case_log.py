@@ -40,22 +40,22 @@ def known(folder: Path) -> dict[int, SweepResult]:
     """Reads the results in all files of a folder, by number of the case, without damaged lines."""
     found = {}
     for path in sorted(folder.glob("*.csv")):
-        for number, *_, loss, altered, void, status in csv.reader(_whole_lines(path)):
+        for number, *_, loss, altered, void, status in csv.reader(_valid_lines(path)):
             found[int(number)] = SweepResult(float(loss), float(altered), float(void), status)
     return found
 
 
-def _whole_lines(path: Path) -> Iterator[str]:
-    """Yields the lines of a file whose checks hold, without these; the heading is none."""
+def _valid_lines(path: Path) -> Iterator[str]:
+    """Yields the lines of a file whose checksums hold, without these; the heading is none."""
     with path.open(encoding="utf-8", errors="replace", newline="\n") as file:
         for line in file:
-            told, _, check = line.rpartition(",")
-            if check == f"{_check(told)}\n":
-                yield told
+            content, _, check = line.rpartition(",")
+            if check == f"{_checksum(content)}\n":
+                yield content
 
 
-def _check(told: str) -> str:
-    return f"{zlib.crc32(told.encode()):08x}"
+def _checksum(content: str) -> str:
+    return f"{zlib.crc32(content.encode()):08x}"
 
 
 class CaseLog:
@@ -63,7 +63,7 @@ class CaseLog:
 
     def __init__(self, path: Path, keys: Sequence[str]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _cut_off(path)
+        _remove_partial_line(path)
         self._file: TextIO = path.open("a", encoding="utf-8", newline="")
         if path.stat().st_size == 0:
             self._file.write(f"{_row(header(keys))}\n")
@@ -72,8 +72,8 @@ class CaseLog:
         """Adds numbers, settings and results of some cases, on the disk when this returns."""
         for number, setting, found in rows:
             status = " ".join(found.status.split())
-            told = _row([number, *setting, *map(repr, found[:-1]), status])
-            self._file.write(f"{told},{_check(told)}\n")
+            content = _row([number, *setting, *map(repr, found[:-1]), status])
+            self._file.write(f"{content},{_checksum(content)}\n")
         self._file.flush()
         os.fsync(self._file.fileno())
 
@@ -90,7 +90,7 @@ def _row(cells: Iterable[object]) -> str:
     return text.getvalue()
 
 
-def _cut_off(path: Path) -> None:
+def _remove_partial_line(path: Path) -> None:
     """Removes a last line that a kill left unfinished."""
     if path.exists():
         content = path.read_bytes()

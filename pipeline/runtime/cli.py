@@ -25,7 +25,7 @@ __all__ = ["command_line", "imported", "leave", "parser", "progress", "run"]
 Work = Callable[[argparse.Namespace], None]
 
 LOG = logging.getLogger(__name__)
-_ROOMS = ("sim", "pipeline", "reports", "metacloak", "__main__")
+_LOGGERS = ("sim", "pipeline", "reports", "metacloak", "__main__")
 
 GRACE = 10
 """Seconds that a terminated process may take to put away what is half done."""
@@ -42,10 +42,14 @@ def parser(command: str, description: str, *, study: bool = True) -> argparse.Ar
 
     `study` tells whether it wants --problem and --preset.
     """
-    return _framed(f"python -m {command}", description, (*(PROBLEM if study else ()), *_COMMON))
+    return _make_parser(
+        f"python -m {command}", description, (*(PROBLEM if study else ()), *_COMMON)
+    )
 
 
-def _framed(program: str, description: str, options: Iterable[Option]) -> argparse.ArgumentParser:
+def _make_parser(
+    program: str, description: str, options: Iterable[Option]
+) -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog=program,
         description=description,
@@ -61,13 +65,13 @@ def command_line(stage: Stage) -> argparse.ArgumentParser:
     does = f"{stage.does[0].upper()}{stage.does[1:]}."
     study = PROBLEM if stage.unused is not None and not stage.parts else ()
     shared = (*study, *(() if stage.passes_on else _COMMON))
-    made = _framed(f"{_PROGRAM} {stage.name}", f"{does}\n\n{stage.about}".strip(), shared)
+    made = _make_parser(f"{_PROGRAM} {stage.name}", f"{does}\n\n{stage.about}".strip(), shared)
     for name in stage.inputs:
         made.add_argument(f"--{name}", type=Path, required=True, metavar="NC", help="to read")
     _add(made, stage.options)
     if stage.threads:
-        told = f"{stage.threads} simulated side by side"
-        made.add_argument("--threads", type=int, default=1, help=told)
+        text = f"{stage.threads} simulated side by side"
+        made.add_argument("--threads", type=int, default=1, help=text)
     if stage.parts:
         commands = made.add_subparsers(dest="command", required=True)
         for name, options in stage.parts.items():
@@ -86,7 +90,7 @@ def _add(made: argparse.ArgumentParser, options: Iterable[Option]) -> None:
 
 
 def run(work: Work, made: argparse.ArgumentParser, argv: Sequence[str] | None = None) -> int:
-    """Parses the command line, does the work, and tells of errors in words.
+    """Parses the command line, does the work, and reports errors in words.
 
     Returns:
         The exit code: 0 done, 2 a mistake in the input, 1 the machine refused or there is a bug,
@@ -95,8 +99,8 @@ def run(work: Work, made: argparse.ArgumentParser, argv: Sequence[str] | None = 
     streams.complete()
     args = made.parse_args(argv)
     try:
-        with _logging(args.log, quiet=args.quiet), _terminable():
-            return _guarded(work, args)
+        with _logging(args.log, quiet=args.quiet), _handle_termination():
+            return _run_reported(work, args)
     except UserError as error:  # the log itself could not be written
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         return 2
@@ -131,19 +135,19 @@ def leave(code: int) -> NoReturn:
     os._exit(code)
 
 
-def _guarded(work: Work, args: argparse.Namespace) -> int:
+def _run_reported(work: Work, args: argparse.Namespace) -> int:
     try:
         work(args)
     except KeyboardInterrupt:
         LOG.error("interrupted: run the same command again to finish")
         return 130
     except Exception as error:  # noqa: BLE001  (told, and kept in the log)
-        return _told(error, args)
+        return _report(error, args)
     return 0
 
 
-def _told(error: Exception, args: argparse.Namespace) -> int:
-    """Tells of an error in words, and returns the exit code."""
+def _report(error: Exception, args: argparse.Namespace) -> int:
+    """Reports an error in words; returns the exit code."""
     log: Path | None = args.log
     if isinstance(error, UserError):
         if error.file is None and error.key is not None:
@@ -171,13 +175,13 @@ def _told(error: Exception, args: argparse.Namespace) -> int:
 def _logging(log: Path | None, *, quiet: bool) -> Iterator[None]:
     """Sends messages of the project to stderr, and all that there is to the log."""
     console = logging.StreamHandler()
-    console.setFormatter(_Words())
+    console.setFormatter(_MessageFormatter())
     console.setLevel(logging.ERROR if quiet else logging.INFO)
     console.addFilter(lambda record: not getattr(record, "drawn", False))
     handlers: list[logging.Handler] = [console]
     if log is not None:
         handlers.append(_log_file(log))
-    loggers = [logging.getLogger(room) for room in _ROOMS]
+    loggers = [logging.getLogger(package) for package in _LOGGERS]
     for logger in loggers:
         logger.setLevel(logging.INFO if log is None else logging.DEBUG)
         for handler in handlers:
@@ -191,13 +195,13 @@ def _logging(log: Path | None, *, quiet: bool) -> Iterator[None]:
             handler.close()
 
 
-class _Words(logging.Formatter):
+class _MessageFormatter(logging.Formatter):
     """Writes messages as they are; warnings are called so."""
 
     def format(self, record: logging.LogRecord) -> str:
         """See ``logging.Formatter``."""
-        told = super().format(record)
-        return f"warning: {told}" if record.levelno == logging.WARNING else told
+        text = super().format(record)
+        return f"warning: {text}" if record.levelno == logging.WARNING else text
 
 
 def _log_file(log: Path) -> logging.Handler:
@@ -212,7 +216,7 @@ def _log_file(log: Path) -> logging.Handler:
 
 
 @contextmanager
-def _terminable() -> Iterator[None]:
+def _handle_termination() -> Iterator[None]:
     """Lets SIGTERM unwind the stack, so that what is half done is put away.
 
     An exception amid a library's lock may leave it held, and the unwinding wait for it: the process

@@ -46,15 +46,15 @@ def pin() -> None:
     if instruction_set.can_pin():
         os.environ.update(instruction_set.LIBRARIES)
         os.environ["XLA_FLAGS"] += f" {instruction_set.XLA_FLAG}"
-    _name_the_user()
-    _give_caches_a_home()
+    _set_user_name()
+    _set_cache_folder()
     # found by content, so from any checkout
     jax = {"JAX_COMPILATION_CACHE_DIR": str(platformdirs.user_cache_path("metacloak") / "jax")}
     for name, value in (CACHES | jax).items():
         os.environ.setdefault(name, value)
 
 
-def _name_the_user() -> None:
+def _set_user_name() -> None:
     """Names the user by number where the machine knows no name, as in a container: snakemake asks.
 
     The list of users has no entry for it then; Python 3.13 tells so by another error.
@@ -65,7 +65,7 @@ def _name_the_user() -> None:
         os.environ["LOGNAME"] = str(os.getuid())
 
 
-def _give_caches_a_home() -> None:
+def _set_cache_folder() -> None:
     """Names a folder below TMPDIR for all caches of the user, where theirs cannot be written.
 
     It is also the home of a user who has none, whose caches then lie there.
@@ -78,7 +78,7 @@ def _give_caches_a_home() -> None:
     with suppress(OSError):
         if not _has_home():
             os.environ["HOME"] = str(make_temporary_folder())
-        if not _can_be_written(platformdirs.user_cache_path()):
+        if not _is_writable(platformdirs.user_cache_path()):
             os.environ["XDG_CACHE_HOME"] = str(make_temporary_folder())
 
 
@@ -90,7 +90,7 @@ def _has_home() -> bool:
     return True
 
 
-def _can_be_written(folder: Path) -> bool:
+def _is_writable(folder: Path) -> bool:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:

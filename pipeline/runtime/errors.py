@@ -66,7 +66,7 @@ def _shortened(text: str) -> str:
 
 
 def refusal(path: str | PathLike[str], error: OSError) -> UserError:
-    """Tells the user what it means that the machine refused the file or folder `path`."""
+    """Explains, to the user, an error of the system about the file or folder `path`."""
     otherwise = (error.strerror or str(error), "check the path, then run the same command again")
     what, remedy = _REFUSALS.get(error.errno or 0, otherwise)
     return UserError(what, file=path, remedy=remedy)

@@ -43,8 +43,8 @@ class Progress:
         self._total, self._label, self._done, self._initial = total, label, initial, initial
         self._clock = clock
         self._start = self._told_at = clock()
-        self._told_share = self._share()
-        self._bar = self._drawn() if (_may_draw() if bar is None else bar) else None
+        self._told_share = self._fraction()
+        self._bar = self._draw() if (_can_draw() if bar is None else bar) else None
 
     def __enter__(self) -> Self:
         return self
@@ -62,34 +62,36 @@ class Progress:
         """Count `steps` more and tell of them if it is time; `figures` are shown behind."""
         self._done += steps
         self._total = max(self._total, self._done)
-        told = {name: x if isinstance(x, str) else f"{x:.4g}" for name, x in figures.items()}
+        figures_text = {
+            name: x if isinstance(x, str) else f"{x:.4g}" for name, x in figures.items()
+        }
         if self._bar is not None:
             self._bar.total = self._total
-            self._bar.set_postfix(told, refresh=False)
+            self._bar.set_postfix(figures_text, refresh=False)
             self._bar.update(steps)
-        now, share = self._clock(), self._share()
+        now, share = self._clock(), self._fraction()
         if share > self._told_share or now - self._told_at >= _SECONDS_BETWEEN_LINES:
             self._told_at, self._told_share = now, share
-            LOG.info(self._line(now, told), extra={"drawn": self._bar is not None})
+            LOG.info(self._line(now, figures_text), extra={"drawn": self._bar is not None})
 
-    def _share(self) -> int:
+    def _fraction(self) -> int:
         return self._done * _LINES_PER_JOB // max(self._total, 1)
 
-    def _line(self, now: float, told: dict[str, str]) -> str:
+    def _line(self, now: float, figures_text: dict[str, str]) -> str:
         spent = now - self._start
         fresh = max(self._done - self._initial, 1)
         left = spent / fresh * max(self._total - self._done, 0)
-        figures = "".join(f", {name} {value}" for name, value in told.items())
+        figures = "".join(f", {name} {value}" for name, value in figures_text.items())
         times = f"{_duration(spent)} spent, {_duration(left)} left"
         return f"{self._label}: {self._done}/{self._total}, {times}{figures}"
 
-    def _drawn(self) -> tqdm:
+    def _draw(self) -> tqdm:
         from tqdm import tqdm
 
         return tqdm(total=self._total, initial=self._initial, desc=self._label, dynamic_ncols=True)
 
 
-def _may_draw() -> bool:
+def _can_draw() -> bool:
     # In a workflow, the bars of jobs that run side by side would overwrite each other.
     return LOG.isEnabledFor(logging.INFO) and sys.stderr.isatty() and RUN_MARK not in os.environ
 

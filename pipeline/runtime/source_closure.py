@@ -25,10 +25,10 @@ RESOURCES = _C | _SHOWN | {".csv", ".json", ".toml", ".yaml"}
 def source_hash(module: str, root: Path = ROOT) -> str:
     """Hashes the source of a module and of everything of this project that it imports."""
     store = (CACHE if root == ROOT else root / ".cache") / "source_hashes.json"
-    known = _kept_hashes(store, _tree_hash(root))
+    known = _stored_hashes(store, _tree_hash(root))
     if module not in known:
         known[module] = _digest(source_files(module, root), root)
-        _keep(store, {"tree": _tree_hash(root), "hashes": known})
+        _store_hashes(store, {"tree": _tree_hash(root), "hashes": known})
     return known[module]
 
 
@@ -41,7 +41,7 @@ def _tree_hash(root: Path) -> str:
     return _digest(sorted(file for file in files if file.suffix in kinds), root)
 
 
-def _kept_hashes(store: Path, tree: str) -> dict[str, str]:
+def _stored_hashes(store: Path, tree: str) -> dict[str, str]:
     try:
         kept = json.loads(store.read_bytes())
         return dict(kept["hashes"]) if kept["tree"] == tree else {}
@@ -49,7 +49,7 @@ def _kept_hashes(store: Path, tree: str) -> dict[str, str]:
         return {}
 
 
-def _keep(store: Path, hashes: dict[str, object]) -> None:
+def _store_hashes(store: Path, hashes: dict[str, object]) -> None:
     aside = store.with_name(f".part_{os.getpid()}_{store.name}")
     with suppress(OSError):  # a folder that is read-only: they are computed each time
         store.parent.mkdir(parents=True, exist_ok=True)

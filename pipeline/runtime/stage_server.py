@@ -34,9 +34,9 @@ SOCKET = "METACLOAK_STAGES"
 
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 _STREAMS = (0, 1, 2)
-_HANDED_ON = (signal.SIGTERM, signal.SIGINT)
+_FORWARDED_SIGNALS = (signal.SIGTERM, signal.SIGINT)
 _LENGTH = 8  # bytes that say how long a request is
-_TAKEN_UP = b"+"  # comes before the exit code, as soon as a stage has a process
+_ACCEPTED = b"+"  # comes before the exit code, as soon as a stage has a process
 
 
 class _Request(NamedTuple):
@@ -93,32 +93,32 @@ def delegate(program: str, imports: str) -> int | None:
             server.connect(os.environ[SOCKET])
         except (KeyError, OSError):
             return None
-        asked = _Request(program, imports, sys.argv, str(Path.cwd()), dict(os.environ))
-        with _passed_on(server):
-            if not _is_taken_up(server, asked):
+        request = _Request(program, imports, sys.argv, str(Path.cwd()), dict(os.environ))
+        with _forwarding(server):
+            if not _is_accepted(server, request):
                 return None
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _FORWARDED_SIGNALS)
             code = b""
             with suppress(OSError):  # the server is killed amid the stage, which ends with it
                 code = server.recv(2, socket.MSG_WAITALL)
     status = int.from_bytes(code, signed=True) if len(code) == 2 else -signal.SIGKILL
     if status < 0:
-        _end_by(-status)
+        _end_by_signal(-status)
     return status
 
 
-def _is_taken_up(server: socket.socket, asked: _Request) -> bool:
-    """Hands a request to the server, and tells whether this has a process for it."""
-    request = json.dumps(asked).encode()
+def _is_accepted(server: socket.socket, request: _Request) -> bool:
+    """Sends a request to the server; returns whether this has a process for it."""
+    payload = json.dumps(request).encode()
     try:
-        socket.send_fds(server, [len(request).to_bytes(_LENGTH)], _STREAMS)
-        server.sendall(request)
-        return server.recv(len(_TAKEN_UP)) == _TAKEN_UP
+        socket.send_fds(server, [len(payload).to_bytes(_LENGTH)], _STREAMS)
+        server.sendall(payload)
+        return server.recv(len(_ACCEPTED)) == _ACCEPTED
     except OSError:  # the server has gone
         return False
 
 
-def _end_by(number: int) -> None:
+def _end_by_signal(number: int) -> None:
     """Ends this process by the signal that ended its stage."""
     if number == signal.SIGKILL:  # which has its one way to be handled, and tells nothing itself
         print("killed, mostly for want of memory", file=sys.stderr, flush=True)  # noqa: T201
@@ -128,25 +128,25 @@ def _end_by(number: int) -> None:
 
 
 @contextmanager
-def _passed_on(server: socket.socket) -> Iterator[None]:
-    """Hands signals on to the stage, which is in a group of its own: each reaches it once.
+def _forwarding(server: socket.socket) -> Iterator[None]:
+    """Forwards signals to the stage, which is in a group of its own: each reaches it once.
 
     They begin blocked: none can come before the request that it belongs to, and this process gets
     itself those that come before somebody takes it up.
     """
 
-    def hand_on(number: int, _: object) -> None:
+    def forward(number: int, _: object) -> None:
         with suppress(OSError):
             server.sendall(bytes([number]))
 
-    signal.pthread_sigmask(signal.SIG_BLOCK, _HANDED_ON)
-    before = {number: signal.signal(number, hand_on) for number in _HANDED_ON}
+    signal.pthread_sigmask(signal.SIG_BLOCK, _FORWARDED_SIGNALS)
+    before = {number: signal.signal(number, forward) for number in _FORWARDED_SIGNALS}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _FORWARDED_SIGNALS)
 
 
 class _Job(NamedTuple):
@@ -157,7 +157,7 @@ class _Job(NamedTuple):
 
 
 class _Server:
-    """Forks a process for every request, and tells its client how it ended.
+    """Forks a process for every request, and sends its client the exit code.
 
     Args:
         listener: takes the clients.
@@ -166,34 +166,34 @@ class _Server:
     """
 
     def __init__(self, listener: socket.socket, life: int, ended: int) -> None:
-        self._waiting = selectors.DefaultSelector()
+        self._selector = selectors.DefaultSelector()
         self._jobs: set[_Job] = set()
         self._patience: float | None = None  # seconds that stages get to end by themselves
-        self._listener, self._life, self._ended = listener, life, ended
-        self._wait_for(listener.fileno(), self._accept)
-        self._wait_for(life, self._finish)
-        self._wait_for(ended, self._look_for_ended)
+        self._listener, self._parent_pipe, self._child_ended = listener, life, ended
+        self._register(listener.fileno(), self._accept)
+        self._register(life, self._finish)
+        self._register(ended, self._reap)
 
     def serve(self) -> _Request | None:
         """Serves until the workflow has ended, and its stages. In a fork: returns what to run."""
         while self._listener.fileno() >= 0 or self._jobs:
-            ready = self._waiting.select(self._patience)
+            ready = self._selector.select(self._patience)
             if not ready:
                 self._signal_stages(signal.SIGKILL)
             for key, _ in ready:
-                if self._waiting.get_map().get(key.fd) is not key:  # its stage has just ended
+                if self._selector.get_map().get(key.fd) is not key:  # its stage has just ended
                     continue
                 if request := key.data():
                     return cast(_Request, request)
         return None
 
-    def _wait_for(self, descriptor: int, then: Callable[[], _Request | None]) -> None:
-        self._waiting.register(descriptor, selectors.EVENT_READ, then)
+    def _register(self, descriptor: int, then: Callable[[], _Request | None]) -> None:
+        self._selector.register(descriptor, selectors.EVENT_READ, then)
 
     def _finish(self) -> None:
         """Ends the stages of a workflow that was killed: one that ends by itself has none left."""
-        self._waiting.unregister(self._life)
-        self._waiting.unregister(self._listener)
+        self._selector.unregister(self._parent_pipe)
+        self._selector.unregister(self._listener)
         self._listener.close()
         self._patience = cli.GRACE
         self._signal_stages(signal.SIGTERM)
@@ -204,7 +204,7 @@ class _Server:
 
     def _accept(self) -> _Request | None:
         client, _ = self._listener.accept()
-        received = _received(client)
+        received = _receive_request(client)
         if received is None:
             client.close()
             return None
@@ -213,59 +213,59 @@ class _Server:
             importlib.import_module(request.imports)
         process = _fork()
         if process == 0:
-            self._leave()
-            _become(request, given)
+            self._close_inherited()
+            _adopt(request, given)
             return request
         for stream in given:
             os.close(stream)
         if process is None:  # the client sees that nobody takes its work up
             client.close()
         else:
-            self._watch(_Job(process, client))
+            self._add_job(_Job(process, client))
         return None
 
-    def _watch(self, job: _Job) -> None:
+    def _add_job(self, job: _Job) -> None:
         self._jobs.add(job)
         with suppress(OSError):  # a client that has gone is seen to have
-            job.client.sendall(_TAKEN_UP)
-        self._wait_for(job.client.fileno(), lambda: self._hand_on(job))
+            job.client.sendall(_ACCEPTED)
+        self._register(job.client.fileno(), lambda: self._forward(job))
 
-    def _leave(self) -> None:
+    def _close_inherited(self) -> None:
         """Closes, in a fork, what belongs to the server and to other stages."""
         os.close(signal.set_wakeup_fd(-1))
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-        for key in list(self._waiting.get_map().values()):
+        for key in list(self._selector.get_map().values()):
             os.close(key.fd)
-        self._waiting.close()
+        self._selector.close()
 
-    def _hand_on(self, job: _Job) -> None:
-        """Sends the stage the signals that its client got; a client that is gone takes it along."""
+    def _forward(self, job: _Job) -> None:
+        """Forwards a client's signals to its stage, which is killed if the client has gone."""
         numbers = b""
         with suppress(OSError):  # it is killed before it has read what it was sent
             numbers = job.client.recv(16)
         for number in numbers or [signal.SIGKILL]:
             os.kill(job.process, number)
         if not numbers:
-            self._waiting.unregister(job.client)
+            self._selector.unregister(job.client)
 
-    def _look_for_ended(self) -> None:
-        """Tells the clients of all stages that have ended: their signals may have come as one."""
-        os.read(self._ended, 4096)
+    def _reap(self) -> None:
+        """Reaps all stages that have ended, and notifies their clients: signals may come as one."""
+        os.read(self._child_ended, 4096)
         for job in list(self._jobs):
             process, status = os.waitpid(job.process, os.WNOHANG)
             if process:
-                self._tell(job, os.waitstatus_to_exitcode(status))
+                self._notify(job, os.waitstatus_to_exitcode(status))
 
-    def _tell(self, job: _Job, code: int) -> None:
+    def _notify(self, job: _Job, code: int) -> None:
         with suppress(KeyError):
-            self._waiting.unregister(job.client)
+            self._selector.unregister(job.client)
         with suppress(OSError):
             job.client.sendall(code.to_bytes(2, signed=True))
         job.client.close()
         self._jobs.discard(job)
 
 
-def _received(client: socket.socket) -> tuple[_Request, list[int]] | None:
+def _receive_request(client: socket.socket) -> tuple[_Request, list[int]] | None:
     """Reads a request and the streams that come with it; None if the client has gone."""
     head, given, _, _ = socket.recv_fds(client, _LENGTH, len(_STREAMS))
     length = int.from_bytes(head)
@@ -284,8 +284,8 @@ def _fork() -> int | None:
     return None
 
 
-def _become(request: _Request, given: list[int]) -> None:
-    """Gives this fork the streams, folder, environment and arguments of its client."""
+def _adopt(request: _Request, given: list[int]) -> None:
+    """Adopts, in a fork, the streams, folder, environment and arguments of its client."""
     ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGTERM)
     os.setpgid(0, 0)
     signal.signal(signal.SIGINT, signal.default_int_handler)

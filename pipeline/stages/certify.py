@@ -22,7 +22,7 @@ from sim.core import Floats, Ints, SimulationError
 from sim.load_family import LoadFamily, LoadLosses, ascend
 from sim.optimise import Journal
 from sim.scene import DIRECTED, Scene, concrete_parameters
-from sim.solvers import Together
+from sim.solvers import Superposition
 
 LOG = logging.getLogger(__name__)
 
@@ -33,7 +33,7 @@ BATCH = 20
 """Loads between two entries of the journal."""
 EVALUATIONS = 12
 """Of the loss and its gradient in a search, about."""
-_NOTHING: Floats = np.zeros(0)
+_NO_DESIGN: Floats = np.zeros(0)
 
 
 def work(args: argparse.Namespace) -> None:
@@ -83,9 +83,9 @@ def losses_journal(out: Path, stage: str, words: Iterable[str]) -> Journal:
     return Journal(folder / "losses.journal", key)
 
 
-def own_places(scene: Scene, family: LoadFamily) -> Floats:
+def nominal_places(scene: Scene, family: LoadFamily) -> Floats:
     """Finds the places (n_cases, n) of the drive's own loads in a family."""
-    motions = [each for each in scene.loads.motions if isinstance(each, DIRECTED | Together)]
+    motions = [each for each in scene.loads.motions if isinstance(each, DIRECTED | Superposition)]
     return np.array([family.place(motion) for motion in motions])
 
 
@@ -97,25 +97,27 @@ def certificate(
     journal: Journal,
     threads: int,
 ) -> xr.Dataset:
-    """The dataset ``certificate`` of designs by name."""
+    """Makes the dataset ``certificate`` of designs by name."""
     scene = scene_of(asked, folder)
     random = np.random.default_rng(SEED)
     loads = random.random((LOADS, family.size))
     starts = random.random((SEARCHES, family.size))
-    own = own_places(scene, family)
+    own = nominal_places(scene, family)
     rows = []
     with cli.progress(len(paths) * (LOADS + len(own) + SEARCHES), "loads") as bar:
         for path in paths.values():
             structure = structures_of(scene, read_design(asked, path))["cloaked"]
-            tried = TriedDesign(*structure, family, journal, threads, bar.update)
-            rows.append((tried.losses(loads), tried.losses(own), tried.searches(starts)))
+            evaluator = BatchedLosses(*structure, family, journal, threads, bar.update)
+            rows.append(
+                (evaluator.losses(loads), evaluator.losses(own), evaluator.searches(starts))
+            )
     losses, nominal, found = (np.array(part) for part in zip(*rows, strict=True))
     ends = found[..., -1]
     made = xr.Dataset(
         {
-            **_numbers("load", ("load",), family, loads),
+            **_load_variables("load", ("load",), family, loads),
             "loss": (("design", "load"), losses),
-            **_numbers("found", ("design", "search"), family, found[..., :-1]),
+            **_load_variables("found", ("design", "search"), family, found[..., :-1]),
             # a search may have come to no load that can be simulated
             "found_loss": (("design", "search"), np.where(np.isfinite(ends), ends, np.nan)),
             "nominal_loss": (("design",), nominal @ scene.loads.case_weights),
@@ -128,10 +130,10 @@ def certificate(
     return made
 
 
-def _numbers(
+def _load_variables(
     name: str, dims: tuple[str, ...], family: LoadFamily, places: Floats
 ) -> dict[str, tuple[tuple[str, ...], Floats | Ints]]:
-    """Tells directions in degrees, amplitudes, frequencies and set-ups of places (..., n)."""
+    """Lists directions in degrees, amplitudes, frequencies and set-ups of places (..., n)."""
     numbers = family.numbers(places)
     unknown = np.full(numbers.shape[:-1], np.nan)
     return {
@@ -142,7 +144,7 @@ def _numbers(
     }
 
 
-class TriedDesign:
+class BatchedLosses:
     """Computes losses of one design under loads, in batches that a journal remembers."""
 
     def __init__(
@@ -163,7 +165,7 @@ class TriedDesign:
 
         def one(place: Floats) -> Floats:
             try:
-                return np.array([self._losses.value(_NOTHING, place)])
+                return np.array([self._losses.value(_NO_DESIGN, place)])
             except SimulationError:
                 return np.array([np.nan])
 
@@ -179,7 +181,7 @@ class TriedDesign:
         return self._in_batches(one, starts)
 
     def _loss(self, place: Floats) -> tuple[float, Floats]:
-        found = self._losses(_NOTHING, place)
+        found = self._losses(_NO_DESIGN, place)
         return found.value, found.by_place
 
     def _in_batches(self, one: Callable[[Floats], Floats], places: Floats) -> Floats:
@@ -188,7 +190,7 @@ class TriedDesign:
         def batch(joined: Floats) -> tuple[float, Floats, Floats]:
             with ThreadPoolExecutor(self._threads) as pool:
                 rows = list(pool.map(one, joined.reshape(-1, places.shape[1])))
-            return 0.0, _NOTHING, np.array(rows)
+            return 0.0, _NO_DESIGN, np.array(rows)
 
         remembered, found = self._journal.wrap(batch), []
         for first in range(0, len(places), BATCH):

@@ -1,4 +1,4 @@
-"""Stage: lays a recording beside the simulation of what it shows, and measures how far they are."""
+"""Stage: compares a recording with the simulation of what it shows."""
 
 import argparse
 import json
@@ -34,7 +34,7 @@ from pipeline.tracking.geometry import as_built
 from pipeline.virtual_lab import select_structure
 
 LOG = logging.getLogger(__name__)
-_OPPOSED = -0.5
+_OPPOSED_CORRELATION = -0.5
 """Correlation of forces below which a load cell is thought to count the other way."""
 
 
@@ -48,32 +48,32 @@ def work(args: argparse.Namespace) -> None:
     recording = recordings.load_recording(args.recording)
     files = {name: getattr(args, name) for name in ("design", "response", "track")}
     try:
-        made = compared(asked, recording, args)
+        made = both_sides(asked, recording, args)
     except UserError as error:
         error.file = error.file or str(args.recording)
         raise
-    told = assemble_comparison(made)
+    dataset = assemble_comparison(made)
     origin = {
         **provenance.of_study(asked, "compare", parents=files, plan=_plan(made)),
         "recording": recording.model_dump_json(),
         "synthetic": made.measurement.track.attrs["synthetic"],
     }
     datasets.write(
-        told.assign_attrs(_words(asked, recording, made)), args.out, "comparison", origin
+        dataset.assign_attrs(_attributes(asked, recording, made)), args.out, "comparison", origin
     )
-    _tell(told)
+    _log_metrics(dataset)
 
 
-def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> Compared:
-    """Both sides of a recording, at the frames of its track.
+def both_sides(asked: Problem, recording: Recording, args: argparse.Namespace) -> Compared:
+    """Prepares both sides of a recording, at the frames of its track.
 
     Raises:
         UserError: they do not belong together, or cannot be aligned.
     """
     design = read_design(asked, args.design)
-    whole = datasets.read(args.response, "response")
-    provenance.check_parent(whole, args.response, "design", args.design)
-    response = chosen(whole, recording)
+    every_case = datasets.read(args.response, "response")
+    provenance.check_parent(every_case, args.response, "design", args.design)
+    response = chosen(every_case, recording)
     built = as_built(design, recording.structure)
     structure = structures_of(scene_of(asked, args.problem.parent), design)[recording.structure]
     scene = structure.scene
@@ -82,9 +82,9 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     every = prepare_measurement(datasets.read(args.track, "track"), built, leading)
     axis = find_axis(every.time, every.drive, response, static=asked.static, moved=drive.displaces)
     frequency = np.nan if asked.frequency is None else asked.frequency
-    _check_zero(untared_force(every.force, axis.resting), recording, args.recording)
+    _check_zero(untared_force(every.force, axis.at_rest), recording, args.recording)
     kept = select_frames(axis.time, 1 / frequency)
-    measured, shown = every.taken(kept), axis.taken(kept)
+    measured, shown = every.select(kept), axis.select(kept)
     way = drive_direction(response)
     seen = often_seen(measured.displacement)
     return Compared(
@@ -94,7 +94,7 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
             asked, structure, measured.track, measured.time, way, args.threads
         ),
         nominal=interpolate_response(response, shown.time),
-        quantities=list_quantities(asked, whole.isel(case=recording.case), shown.time, seen),
+        quantities=list_quantities(asked, every_case.isel(case=recording.case), shown.time, seen),
         design=built,
         frequency=frequency,
         level=asked.prediction.level,
@@ -118,7 +118,7 @@ def _check_zero(untared: float, recording: Recording, path: Path) -> None:
 
 
 def chosen(response: xr.Dataset, recording: Recording) -> xr.Dataset:
-    """The structure and load case of a response that a recording shows.
+    """Selects the structure and load case of a response that a recording shows.
 
     Raises:
         UserError: the response has none such.
@@ -133,7 +133,7 @@ def chosen(response: xr.Dataset, recording: Recording) -> xr.Dataset:
 
 
 def _plan(made: Compared) -> dict[str, object]:
-    """Says what was decided, and what is missing."""
+    """Records what was decided, and what is missing."""
     return {
         "frames": len(made.measurement.frames),
         "units_by_use": np.bincount(made.measurement.use, minlength=5).tolist(),
@@ -142,8 +142,8 @@ def _plan(made: Compared) -> dict[str, object]:
     }
 
 
-def _words(asked: Problem, recording: Recording, made: Compared) -> dict[str, str]:
-    """The attributes that tell how both sides were brought together."""
+def _attributes(asked: Problem, recording: Recording, made: Compared) -> dict[str, str]:
+    """Describes in attributes how both sides were brought together."""
     return {
         "title": recording.title or f"{recording.structure} structure",
         "structure": recording.structure,
@@ -152,21 +152,21 @@ def _words(asked: Problem, recording: Recording, made: Compared) -> dict[str, st
     }
 
 
-def _tell(told: xr.Dataset) -> None:
-    """One line about how far the sides are."""
-    apart = told["nrmse"].sel(side="simulated", estimate="value").values
-    alike = told["correlation"].sel(side="simulated", estimate="value").values
+def _log_metrics(dataset: xr.Dataset) -> None:
+    """Logs the distance of the sides in a line."""
+    nrmse = dataset["nrmse"].sel(side="simulated", estimate="value").values
+    correlation = dataset["correlation"].sel(side="simulated", estimate="value").values
     LOG.info(
         "%d frames, %d units; residual %s %% of the motion, correlation %s (ux, uy, theta)",
-        told.sizes["time"],
-        int((told["use"] == 0).sum()),
-        json.dumps([round(100 * float(each), 1) for each in apart]),
-        json.dumps([round(float(each), 4) for each in alike]),
+        dataset.sizes["time"],
+        int((dataset["use"] == 0).sum()),
+        json.dumps([round(100 * float(each), 1) for each in nrmse]),
+        json.dumps([round(float(each), 4) for each in correlation]),
     )
-    along = float(xr.corr(told["load_force"], told["simulated_force"]))
-    if along < _OPPOSED:
+    force_correlation = float(xr.corr(dataset["load_force"], dataset["simulated_force"]))
+    if force_correlation < _OPPOSED_CORRELATION:
         LOG.warning(
             "the load cell's force falls where the simulated one rises (correlation %.2f); if it"
             " counts against the drive, write load_cell: {reversed: true} in the recording",
-            along,
+            force_correlation,
         )

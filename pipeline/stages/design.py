@@ -85,8 +85,8 @@ def _descents(
     """
     found: list[Result | None] = []
     first: UserError | None = None
-    for number, posed in enumerate(every := _seeded(asked, args.method)):
-        kicked = _kicked(start, number, posed, scene)
+    for number, posed in enumerate(every := _with_seeds(asked, args.method)):
+        kicked = _perturb_start(start, number, posed, scene)
         try:
             found.append(_descend(posed, scene, plan, kicked, args))
         except UserError as error:
@@ -101,13 +101,15 @@ def _descents(
     return found
 
 
-def _seeded(asked: Problem, method: str) -> list[Problem]:
+def _with_seeds(asked: Problem, method: str) -> list[Problem]:
     """Poses the problem with the seed of each descent; MMA has no use for any."""
     first, count = asked.optimiser.seed, asked.optimiser.descents if method == "sqp" else 1
     return [asked.with_optimiser(seed=seed) for seed in range(first, first + count)]
 
 
-def _kicked(start: Floats | None, number: int, asked: Problem, scene: Scene) -> Floats | None:
+def _perturb_start(
+    start: Floats | None, number: int, asked: Problem, scene: Scene
+) -> Floats | None:
     """Shifts the start of every descent but the first at random, by the optimiser's kick."""
     if number == 0:
         return start
@@ -227,7 +229,7 @@ def _family_options(asked: Problem) -> FamilyOptions:
 
 
 def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
-    """The dataset ``design_method`` of an optimisation."""
+    """Makes the dataset ``design_method`` of an optimisation."""
     lattice, history = scene.lattice, result.evaluations
     intact = lattice_of(asked)
     vertices = np.asarray(scene.space.vertices(result.x))

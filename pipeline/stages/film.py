@@ -28,7 +28,7 @@ from pipeline.virtual_lab import (
 LOG = logging.getLogger(__name__)
 
 SYNTHETIC = f"{SYNTHETIC_LABEL}: rendered from a simulation, not filmed"
-_WRITTEN = "Written by the stage film; python -m pipeline track takes it."
+_OWN_COMMENT = "Written by the stage film; python -m pipeline track takes it."
 
 
 def work(args: argparse.Namespace) -> None:
@@ -40,7 +40,7 @@ def work(args: argparse.Namespace) -> None:
     if args.command == "render":
         _render(args.recording, args.response, args.design, args.out)
     elif args.command == "weigh":
-        _weigh(args.recording, args.response, args.out)
+        _write_load_log(args.recording, args.response, args.out)
     else:
         _plan(args)
 
@@ -69,7 +69,7 @@ def _plan(args: argparse.Namespace) -> None:
     with cli.progress(len(chosen), "planning") as bar:
         for choice in chosen:
             found = noise_planning.expected_noise(response, structure, case, choice, args.frames)
-            rows.append({**choice.words, **found.words})
+            rows.append({**choice.columns, **found.columns})
             bar.update()
     LOG.info("%s; errors of clips of %d frames", SYNTHETIC, args.frames)
     table = pd.DataFrame(rows)
@@ -81,8 +81,8 @@ def _plan(args: argparse.Namespace) -> None:
 
 
 def _render(path: Path, response: Path, design: Path, out: Path) -> None:
-    asked, virtual = _virtual(path)
-    described = sidecar_path(out, path, ending=".yaml", is_own=begins_with(_WRITTEN))
+    asked, virtual = _load_virtual(path)
+    described = sidecar_path(out, path, ending=".yaml", is_own=begins_with(_OWN_COMMENT))
     truth = sidecar_path(out, response, design, ending="_truth.nc", is_own=_is_truth)
     if out.suffix not in virtual.codec.suffixes:
         what = f"{virtual.codec.name} does not go into such a file"
@@ -90,16 +90,18 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     parents = {"response": response, "design": design}
     origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=True)
     with found_in(path):
-        film = prepare_film(_shown(asked, response), asked.structure, asked.specimen, virtual)
+        film = prepare_film(
+            _load_response(asked, response), asked.structure, asked.specimen, virtual
+        )
     title = asked.title or path.stem
     labels = {"title": f"{SYNTHETIC_LABEL}: {title}", "comment": SYNTHETIC}
     with cli.progress(len(film.motion.time), f"rendering {path.stem}") as bar:
         encode_video(out, film.images(bar.update), virtual.rate, virtual.codec, labels)
     made = assemble_truth(film.response, film.present, film.motion, film.scene.view)
     datasets.write(made, truth, "truth", origin)
-    comments = (SYNTHETIC, _WRITTEN)
+    comments = (SYNTHETIC, _OWN_COMMENT)
     with write_atomically(described) as aside:
-        text = recordings.recording_yaml(_described(asked, virtual, out, design), comments)
+        text = recordings.recording_yaml(_recording_values(asked, virtual, out, design), comments)
         aside.write_text(text, encoding="utf-8")
     log = out.with_name(f"{out.stem}_load.csv")
     if virtual.load_cell is not None and not log.exists():
@@ -114,19 +116,19 @@ def _is_truth(path: Path) -> bool:
     return False
 
 
-def _weigh(path: Path, response: Path, out: Path) -> None:
-    asked, virtual = _virtual(path)
+def _write_load_log(path: Path, response: Path, out: Path) -> None:
+    asked, virtual = _load_virtual(path)
     if virtual.load_cell is None:
         remedy = "describe the load cell there"
         raise UserError("no load cell", file=path, key="virtual.load_cell", remedy=remedy)
     with found_in(path):
-        lines = load_cell_log(_shown(asked, response), virtual, virtual.load_cell)
+        lines = load_cell_log(_load_response(asked, response), virtual, virtual.load_cell)
     with write_atomically(out) as aside, aside.open("w", encoding="utf-8") as file:
         file.write(f"# {SYNTHETIC}\ntime,force\n")
         file.writelines(f"{time:.12g},{force:.5f}\n" for time, force in lines)
 
 
-def _virtual(path: Path) -> tuple[Recording, VirtualRecording]:
+def _load_virtual(path: Path) -> tuple[Recording, VirtualRecording]:
     asked = recordings.load_recording(path)
     if asked.virtual is None:
         remedy = "track it (python -m pipeline track), or say under `virtual` how to render it"
@@ -134,7 +136,7 @@ def _virtual(path: Path) -> tuple[Recording, VirtualRecording]:
     return asked, asked.virtual
 
 
-def _shown(asked: Recording, response: Path) -> xr.Dataset:
+def _load_response(asked: Recording, response: Path) -> xr.Dataset:
     """Loads what is filmed: a specimen, or the response at the structure and the case."""
     assert asked.virtual is not None
     if asked.virtual.specimen is not None:
@@ -142,7 +144,7 @@ def _shown(asked: Recording, response: Path) -> xr.Dataset:
     return select_case(datasets.read(response, "response"), asked.structure, asked.case)
 
 
-def _described(
+def _recording_values(
     asked: Recording, virtual: VirtualRecording, video: Path, design: Path
 ) -> dict[str, object]:
     cell = virtual.load_cell
@@ -157,14 +159,14 @@ def _described(
         "pixel_size": f"{virtual.camera.pixel_size:g} mm",
         "thickness": f"{virtual.look.thickness:g} mm",
         "camera_distance": f"{virtual.camera.distance:g} mm",
-        **_viewed(asked),
+        **_viewing_keys(asked),
         "load_axis": asked.load_axis,
         "load_cell": log,
         "synthetic": True,
     }
 
 
-def _viewed(asked: Recording) -> dict[str, object]:
+def _viewing_keys(asked: Recording) -> dict[str, object]:
     """Lists how the video is to be read, as the recording that it is rendered by tells."""
     window, default = asked.window, Recording.model_fields["camera"].default
     ends = {"start": window.start or None, "end": window.end}

@@ -14,10 +14,10 @@ from pipeline.posing import case_directions, loss_units, read_design, scene_of, 
 from pipeline.problem.sections import split_name
 from pipeline.runtime import UserError, cli, source_hash
 from pipeline.stages.certify import (
-    TriedDesign,
+    BatchedLosses,
     loads_in_ranges,
     losses_journal,
-    own_places,
+    nominal_places,
 )
 from pipeline.stages.robust_gains import named_designs
 from sim.load_family import spread_places
@@ -97,13 +97,13 @@ def _point(
     ((parameter, settings),) = several.items()
     family, scene = loads_in_ranges(asked, path), scene_of(asked, path.parent)
     structures = structures_of(scene, read_design(asked, design))
-    tried = TriedDesign(*structures["cloaked"], family, journal, threads, done)
-    own = tried.losses(own_places(scene, family))
+    tried = BatchedLosses(*structures["cloaked"], family, journal, threads, done)
+    own = tried.losses(nominal_places(scene, family))
     spread = spread_places(family, SPREAD, SEED)
     worst_first = np.argsort(-tried.losses(spread))
     found = tried.searches(spread[worst_first[:SEARCHES]])
     worst = found[found[:, -1].argmax()]
-    altered = TriedDesign(*structures["altered"], family, journal, threads, done)
+    altered = BatchedLosses(*structures["altered"], family, journal, threads, done)
     direction, amplitude, *frequency = np.asarray(family.numbers(worst[:-1]))
     return FrontPoint(
         parameter,

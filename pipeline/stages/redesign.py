@@ -35,7 +35,7 @@ def work(args: argparse.Namespace) -> None:
     LOG.info(
         "loss %.5g by angles, %.5g by distances: %s", angle, distance, "kept" if alike else "again"
     )
-    posed = again(asked, 1 if alike else asked.optimiser.geometric.evaluations)
+    posed = with_distance_contact(asked, 1 if alike else asked.optimiser.geometric.evaluations)
     scene = design_scene(posed, args.problem.parent)
     plan = make_plan(scene, threads=args.threads)
     LOG.info("%s", plan.describe())
@@ -48,7 +48,7 @@ def work(args: argparse.Namespace) -> None:
     datasets.write(made, args.out, "design", origin)
 
 
-def again(asked: Problem, evaluations: int) -> Problem:
-    """The problem with contact on distance and this budget."""
+def with_distance_contact(asked: Problem, evaluations: int) -> Problem:
+    """Sets contact on distance and the budget in a problem."""
     methods = Methods(sqp=Method(evaluations=evaluations))
     return law_comparison.under(asked, "geometric").with_optimiser(methods=methods)

@@ -1,4 +1,4 @@
-"""Stage: what the presets that ask for more than a study's own drive gain over its own design."""
+"""Stage: computes the gains of presets with more loads or copies over a study's own design."""
 
 import argparse
 from collections.abc import Iterable, Mapping
@@ -66,7 +66,7 @@ def named_designs(words: Iterable[str]) -> dict[str, Path]:
 
 
 def gains(path: Path, designs: Mapping[str, Path]) -> xr.Dataset:
-    """The dataset ``gains`` of a problem file, from its own design and those of presets.
+    """Makes the dataset ``gains`` of a problem file, from its own design and those of presets.
 
     Raises:
         UserError: a preset asks for nothing but the study's own drive, or a structure cannot be
@@ -75,7 +75,7 @@ def gains(path: Path, designs: Mapping[str, Path]) -> xr.Dataset:
     own = problem.load(path)
     presets = [name for name in designs if name != PLAIN]
     with cli.progress(len(presets) + 1, "losses") as bar:
-        drive = _loss(_held_out(own), path, designs[PLAIN])
+        drive = _loss(_with_held_out_copies(own), path, designs[PLAIN])
         bar.update()
         rows = []
         for name in presets:
@@ -92,12 +92,12 @@ def gains(path: Path, designs: Mapping[str, Path]) -> xr.Dataset:
 
 
 def _gain(path: Path, preset: str, designs: Mapping[str, Path]) -> Gain:
-    """One preset; the copies are others than any design was made with."""
+    """Evaluates one preset; the copies are others than any design was made with."""
     asked, drive = problem.load(path, preset), problem.load(path)
     if not asked.asks_more_than(drive):
         what, remedy = "the preset asks for nothing but the study's own drive", "leave it out"
         raise UserError(what, file=path, value=preset, remedy=remedy)
-    robust, held = asked.objective.robust, _held_out(asked)
+    robust, held = asked.objective.robust, _with_held_out_copies(asked)
     plain, own = (_loss(held, path, designs[name], preset) for name in (PLAIN, preset))
     return Gain(
         asks=asked.title,
@@ -106,11 +106,11 @@ def _gain(path: Path, preset: str, designs: Mapping[str, Path]) -> Gain:
         loss_plain=plain,
         loss_own=own,
         loss_altered=_loss(held, path, None, preset),
-        price=_loss(_held_out(drive), path, designs[preset]),
+        price=_loss(_with_held_out_copies(drive), path, designs[preset]),
     )
 
 
-def _held_out(asked: Problem) -> Problem:
+def _with_held_out_copies(asked: Problem) -> Problem:
     robust = asked.objective.robust
     if robust is None or not robust.copies:
         return asked
@@ -120,7 +120,7 @@ def _held_out(asked: Problem) -> Problem:
 
 
 def _loss(asked: Problem, source: Path, path: Path | None, preset: str = PLAIN) -> float:
-    """The loss of a design, or of the structure before any; over the copies, if there are any.
+    """Computes the loss of a design, or of the initial structure; over the copies, if any.
 
     What is asked is that of a preset, or of the study itself.
 
@@ -135,17 +135,17 @@ def _loss(asked: Problem, source: Path, path: Path | None, preset: str = PLAIN) 
         if (angles := designed_angles(design)) is not None:
             scene = scene.bent(angles)
     try:
-        return _over_copies(scene, vertices, name)
+        return _mean_loss(scene, vertices, name)
     except StoppedError as stopped:
         raise stopped.explain(asked, source) from stopped
 
 
-def _over_copies(scene: Scene, vertices: NDArray[np.float64], name: str) -> float:
+def _mean_loss(scene: Scene, vertices: NDArray[np.float64], name: str) -> float:
     copies = scene.design.copies
     if copies is None:
-        return _of(scene, vertices, name)
+        return _simulate_loss(scene, vertices, name)
     losses = [
-        _of(
+        _simulate_loss(
             scene.updated(material=scene.structure.material.scaled(stiffness)),
             vertices + shifts[scene.lattice.group],
             f"{name} (copy {number} of {len(copies)})",
@@ -158,7 +158,7 @@ def _over_copies(scene: Scene, vertices: NDArray[np.float64], name: str) -> floa
     return float(combined(np.array(losses), weights, scene.objective.copy_sharpness))
 
 
-def _of(scene: Scene, vertices: NDArray[np.float64], name: str) -> float:
+def _simulate_loss(scene: Scene, vertices: NDArray[np.float64], name: str) -> float:
     try:
         rest, there = at_rest(scene, vertices)
         plan = make_plan(rest, there, gradient=False)

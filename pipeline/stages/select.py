@@ -35,7 +35,7 @@ def work(args: argparse.Namespace) -> None:
     best = min(designs, key=lambda method: _merit(designs[method]))
     if overlaps := int(designs[best]["overlaps"]):
         LOG.warning("%d pairs of units overlap in the shipped design", overlaps)
-    if missed := _missed(designs[best]):
+    if missed := _violation(designs[best]):
         LOG.warning("the shipped design misses a constraint by %.2g (mm, or rad)", missed)
     for method, design in designs.items():
         LOG.info("%s: loss %.5g", method, float(design["best_loss"]))
@@ -49,10 +49,10 @@ def work(args: argparse.Namespace) -> None:
 
 def _merit(design: xr.Dataset) -> tuple[int, float, float]:
     """Overlapping pairs, found by geometry apart from the constraints; what it misses; the loss."""
-    return int(design["overlaps"]), _missed(design), float(design["best_loss"])
+    return int(design["overlaps"]), _violation(design), float(design["best_loss"])
 
 
-def _missed(design: xr.Dataset) -> float:
+def _violation(design: xr.Dataset) -> float:
     """Reads by how much a design misses a constraint, zero if it counts as feasible."""
     missed = float(design["violation"].isel(evaluation=int(design["best_evaluation"])))
     return missed if missed > FEASIBLE else 0.0

@@ -38,7 +38,7 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: a structure could not be followed to its end; what was computed is kept.
     """
-    _partial(args).unlink(missing_ok=True)  # of a run before this one
+    _partial_path(args).unlink(missing_ok=True)  # of a run before this one
     asked = problem.load(args.problem, args.preset)
     asked = law_comparison.under(asked, "geometric") if args.geometric else asked
     if args.certificate is not None:
@@ -49,7 +49,7 @@ def work(args: argparse.Namespace) -> None:
     try:
         made, plans = response_dataset(asked, structures, args.threads)
     except StoppedError as stopped:
-        kept = _keep(asked, structures, stopped, args)
+        kept = _write_partial(asked, structures, stopped, args)
         raise stopped.explain(asked, args.problem, kept) from stopped
     origin = provenance.of_study(asked, "simulate", parents=_parents(args), plan=plans)
     datasets.write(made, args.out, "response", origin)
@@ -61,7 +61,7 @@ def _parents(args: argparse.Namespace) -> dict[str, Path]:
     return {role: path for role, path in given.items() if path is not None}
 
 
-def _keep(
+def _write_partial(
     asked: Problem,
     structures: dict[str, PosedStructure],
     stopped: StoppedError,
@@ -76,38 +76,38 @@ def _keep(
     if steps == 0:
         return None
     shorter = {
-        name: each._replace(scene=_until(each.scene, steps)) for name, each in structures.items()
+        name: each._replace(scene=_shorten(each.scene, steps)) for name, each in structures.items()
     }
     try:
         made, plans = response_dataset(asked, shorter, args.threads)
     except StoppedError as again:
-        return _keep(asked, shorter, again, args)
-    out = _partial(args)
+        return _write_partial(asked, shorter, again, args)
+    out = _partial_path(args)
     origin = provenance.of_study(asked, "simulate", parents=_parents(args), plan=plans)
     datasets.write(made, out, "response", origin)
     return out
 
 
-def _partial(args: argparse.Namespace) -> Path:
+def _partial_path(args: argparse.Namespace) -> Path:
     """Names the file for a response that could not be followed to its end."""
     out: Path = args.out
     return out.with_name(f"{out.stem}_partial.nc")
 
 
-def _until(scene: Scene, steps: int) -> Scene:
-    """A static scene whose path ends after so many of its load steps."""
+def _shorten(scene: Scene, steps: int) -> Scene:
+    """Shortens a static scene to so many of its load steps."""
     assert scene.objective.steps is not None
     return scene.updated(
         duration=scene.loads.duration * steps / scene.objective.steps,
         steps=steps,
-        reference=scene.objective.reference and _until(scene.objective.reference, steps),
+        reference=scene.objective.reference and _shorten(scene.objective.reference, steps),
     )
 
 
 def response_dataset(
     asked: Problem, structures: dict[str, PosedStructure], threads: int
 ) -> tuple[xr.Dataset, dict[str, dict[str, Any]]]:
-    """The dataset ``response`` of the structures, and the plan of each.
+    """Makes the dataset ``response`` of the structures, and the plan of each.
 
     Raises:
         StoppedError: a structure could not be followed to its end.

@@ -66,7 +66,7 @@ def work(args: argparse.Namespace) -> None:
     datasets.write(made, args.out, "spectrum", origin)
 
 
-def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr.Dataset:
+def spectrum(asked: Problem, section: Spectrum, folder: Path, design: Path) -> xr.Dataset:
     """The dataset ``spectrum`` of a problem and its design.
 
     Raises:
@@ -81,14 +81,14 @@ def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr
         for name, each in structures.items():
             states = _equilibria(name, each)
             directions = case_directions(asked)
-            found.append(_vibrations(each, states, wanted, directions, intact.n_units))
+            found.append(_vibrations(each, states, section, directions, intact.n_units))
             bar.update()
     vertices = [
         spread(s.scene.lattice.padded(s.vertices), s.scene.lattice, intact.n_units)
         for s in structures.values()
     ]
     parts = Vibrations(*(np.stack(part) for part in zip(*found, strict=True)))
-    band = wanted.transmission
+    band = section.transmission
     variables: Variables = {
         **network_variables(asked, scene),
         "vertices": (("structure", "unit", "vertex", "xy"), np.stack(vertices)),
@@ -96,7 +96,7 @@ def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr
         "frequency": (_MODE, parts.frequency),
         "mode_shape": ((*_MODE, "unit", "dof"), parts.mode_shape),
         "transmission": (("structure", "state", "case", "excitation"), parts.transmission),
-        **compute_bands(asked, wanted),
+        **compute_bands(asked, section),
     }
     coordinates: Variables = {
         **unit_coordinates(intact),
@@ -104,9 +104,9 @@ def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr
         "state": (("state",), state_names(asked)),
         "direction": (("case",), np.rad2deg(case_directions(asked))),
         "dof": (("dof",), ["ux", "uy", "theta"]),
-        "mode": (("mode",), np.arange(wanted.modes)),
+        "mode": (("mode",), np.arange(section.modes)),
         "excitation": (("excitation",), np.linspace(band.start, band.stop, band.points)),
-        "compression": (("compression",), list(wanted.compressions)),
+        "compression": (("compression",), list(section.compressions)),
     }
     return xr.Dataset(variables, coordinates)
 
@@ -124,7 +124,7 @@ def state_names(asked: Problem) -> list[str]:
 def _vibrations(
     structure: PosedStructure,
     states: Sequence[Floats],
-    wanted: Spectrum,
+    section: Spectrum,
     directions: Sequence[float],
     size: int,
 ) -> Vibrations:
@@ -134,8 +134,8 @@ def _vibrations(
     found = []
     for state in states:
         made = linearised(scene.topology, values, state)
-        frequency, shape = _modes(made, wanted.modes)
-        sent = _transmission(made, structure, wanted, directions)
+        frequency, shape = _modes(made, section.modes)
+        sent = _transmission(made, structure, section, directions)
         whole = spread(state, lattice, size), spread(shape, lattice, size, axis=1)
         found.append(Vibrations(whole[0], frequency, whole[1], sent))
     return Vibrations(*(np.stack(part) for part in zip(*found, strict=True)))
@@ -165,14 +165,14 @@ def _modes(made: Linear, count: int) -> tuple[Floats, Floats]:
 
 
 def _transmission(
-    made: Linear, structure: PosedStructure, wanted: Spectrum, directions: Sequence[float]
+    made: Linear, structure: PosedStructure, section: Spectrum, directions: Sequence[float]
 ) -> Floats:
     """Root mean square motion (n_cases, n_frequencies) of the region under a unit drive."""
     scene = structure.scene
     unit, dof = np.divmod(made.held, 3)
     along = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in directions])
     drives = np.where(np.isin(unit, scene.loads.driven)[:, None], along.T[dof], 0.0)
-    band = wanted.transmission
+    band = section.transmission
     excited = 2 * np.pi * np.linspace(band.start, band.stop, band.points)
     moved = transmission(made, drives, excited)[:, :, scene.objective.region, :2]
     return np.asarray(np.sqrt((np.abs(moved) ** 2).sum(axis=-1).mean(axis=-1)).T)

@@ -55,9 +55,9 @@ def _compute(args: argparse.Namespace, asked: Problem, chunk: int, chunks: int) 
     here = sweep_cases.select_groups(asked.sweep, chunk, chunks)
     found = case_log.known(folder)
     path = folder / f"part_{chunk}.csv"
-    with case_log.CaseLog(path, asked.sweep.keys) as book:
+    with case_log.CaseLog(path, asked.sweep.keys) as log:
         LOG.info("results as they come: %s", path)
-        _simulate(args, asked, design, here, found, book)
+        _simulate(args, asked, design, here, found, log)
     made = dataset(asked, [case for group in here for case in group.cases], found)
     LOG.info("%d of %d cases failed", int((made["status"] != "ok").sum()), made.sizes["case"])
     origin = provenance.of_study(asked, "sweep", parents=parents)
@@ -70,23 +70,23 @@ def _simulate(
     design: xr.Dataset,
     groups: Sequence[DirectionGroup],
     found: dict[int, SweepResult],
-    book: CaseLog,
+    log: CaseLog,
 ) -> None:
     """Adds what is missing to ``found`` and to the case log."""
     failed = 0
     with cli.progress(sum(len(group.numbers) for group in groups), "cases") as bar:
         for group in groups:
             if not found.keys() >= set(group.numbers):
-                rows = _results(args, asked, design, group)
+                rows = _group_results(args, asked, design, group)
                 found.update(zip(group.numbers, rows, strict=True))
                 words = [list(each.values()) for each in group.settings]
-                book.add(zip(group.numbers, words, rows, strict=True))
+                log.add(zip(group.numbers, words, rows, strict=True))
             for number in group.numbers:
                 failed += found[number].status != "ok"
                 bar.update(failed=failed)
 
 
-def _results(
+def _group_results(
     args: argparse.Namespace, asked: Problem, design: xr.Dataset, group: DirectionGroup
 ) -> list[SweepResult]:
     setting = group.together
@@ -106,7 +106,7 @@ def dataset(
     cases: Sequence[tuple[int, dict[str, SettingValue]]],
     found: dict[int, SweepResult],
 ) -> xr.Dataset:
-    """The dataset ``sweep`` of some cases."""
+    """Makes the dataset ``sweep`` of some cases."""
     assert asked.sweep is not None
     keys = asked.sweep.keys
     numbers = [number for number, _ in cases]

@@ -26,8 +26,8 @@ from pipeline.tracking.frames import (
     VIDEOS,
     Frame,
     LoadCellLog,
+    MissingTimesError,
     Recording,
-    UntimedError,
     frame_count,
     has_uneven_intervals,
     import_video,
@@ -49,9 +49,9 @@ from pipeline.tracking.motion import (
     Track,
     follow_patch,
     median_uncertainty,
-    moved_outline,
     square,
     track_video,
+    transform_outline,
 )
 from pipeline.tracking.output import (
     assemble_track,
@@ -65,7 +65,7 @@ from sim.core import Floats, Ints
 
 LOG = logging.getLogger(__name__)
 
-_MOVED = "x_px,y_px,u_px,v_px,rotation_deg"
+_PAIR_HEADING = "x_px,y_px,u_px,v_px,rotation_deg"
 _ORANGE = (0, 80, 230)  # blue, green, red
 _UNTIMED = "frame_rate: how many pictures were taken in a second; without it they are not tracked"
 
@@ -77,10 +77,10 @@ def work(args: argparse.Namespace) -> None:
         UserError: a fault of the files, or a video that does not show the design.
     """
     if args.words[0] == "pair":
-        _pair(*(Path(word) for word in args.words[1:]), args=args)
+        _match_pair(*(Path(word) for word in args.words[1:]), args=args)
         return
     *command, file = args.words
-    known = {"": _track, "init": _init, "points": _points, "import": _import}
+    known = {"": _track, "init": _write_proposal, "points": _convert_points, "import": _import}
     if (name := " ".join(command)) not in known:
         remedy = "give one of init, points, import, pair, or a recording alone; see --help"
         raise UserError("no such command", value=name, remedy=remedy)
@@ -92,7 +92,7 @@ def work(args: argparse.Namespace) -> None:
     known[name](Path(file), args)
 
 
-def _points(path: Path, args: argparse.Namespace) -> None:
+def _convert_points(path: Path, args: argparse.Namespace) -> None:
     asked = dic_points.load(path)
     source = _design(asked.design, path, args.design)
     design = as_built(datasets.read(source, "design"), asked.structure)
@@ -107,17 +107,17 @@ def _points(path: Path, args: argparse.Namespace) -> None:
     write_track_table(made.assign_attrs(origin), table)
 
 
-def _init(video: Path, args: argparse.Namespace) -> None:
+def _write_proposal(video: Path, args: argparse.Namespace) -> None:
     _check_positive("--pixel-size", args.pixel_size, "millimetres per pixel, or leave it out")
     design = datasets.read(args.design, "design")
     first, timed = _first_frame(video, args.start, args.frame_rate)
     scale = None if args.pixel_size is None else 1 / args.pixel_size
     with found_in(video):
         found = proposal.propose(first.image, design, scale)
-    doubts = found.doubts if timed else (*found.doubts, _UNTIMED)
+    warnings = found.warnings if timed else (*found.warnings, _UNTIMED)
     out = args.out_dir / f"{video.stem}.yaml"
     if out.exists():
-        raise _there_is_one(out)
+        raise _already_exists(out)
     drawn = sidecar_path(out, video, ending="_units.png", is_own=is_own_drawing, key="--out-dir")
     values = {
         "title": video.stem,
@@ -133,12 +133,12 @@ def _init(video: Path, args: argparse.Namespace) -> None:
     note = SYNTHETIC_LABEL if rendered(video) else ""
     write_drawing(proposal.draw_proposal(first.image, found, note), drawn)
     with write_atomically(out) as aside:
-        comments = ("What the first frame did not tell:", *doubts)
+        comments = ("What the first frame did not tell:", *warnings)
         aside.write_text(recording.recording_yaml(values, comments), encoding="utf-8")
     seen = f"{len(found.detection.unit)} of {found.specimen.count} units, {found.kind}"
     LOG.info("%s: %s, %.4g mm/px; see %s", out, seen, found.pixel_size, drawn)
-    for doubt in doubts:
-        LOG.info("not told: %s", doubt)
+    for warning in warnings:
+        LOG.info("not told: %s", warning)
 
 
 def _first_frame(video: Path, start: float, rate: float | None) -> tuple[Frame, bool]:
@@ -150,7 +150,7 @@ def _first_frame(video: Path, start: float, rate: float | None) -> tuple[Frame, 
     timed = True
     try:
         first = next(read_frames(video, start, rate=rate), None)
-    except UntimedError as error:
+    except MissingTimesError as error:
         if start:
             remedy = "tell how many were taken in a second, such as --frame-rate 300"
             raise UserError(error.what, file=video, key="--frame-rate", remedy=remedy) from error
@@ -167,7 +167,7 @@ def _check_positive(option: str, value: float | None, wanted: str) -> None:
         raise UserError(what, key=option, value=value, remedy=remedy)
 
 
-def _pair(*pictures: Path, args: argparse.Namespace) -> None:
+def _match_pair(*pictures: Path, args: argparse.Namespace) -> None:
     import cv2
 
     if len(pictures) != 2 or args.out is None or len(args.at or []) % 2 or not args.at:
@@ -182,7 +182,7 @@ def _pair(*pictures: Path, args: argparse.Namespace) -> None:
             remedy = f"give x to {before.shape[1] - 1} and y to {before.shape[0] - 1}"
             what, value = "a patch lies outside of the picture", centre.tolist()
             raise UserError(what, file=pictures[0], key="--at", value=value, remedy=remedy)
-    drawn, rows = cv2.cvtColor(after, cv2.COLOR_GRAY2BGR), [_MOVED]
+    drawn, rows = cv2.cvtColor(after, cv2.COLOR_GRAY2BGR), [_PAIR_HEADING]
     for centre in centres:
         outline = square(centre, args.side)
         motion = follow_patch(Patch(before, after, outline, centre))
@@ -192,7 +192,7 @@ def _pair(*pictures: Path, args: argparse.Namespace) -> None:
             LOG.warning("nothing like the patch at %g, %g is seen again", *centre)
             continue
         LOG.info("%g, %g moved by %.4f, %.4f px and turned by %.3f deg", *row)
-        corners = np.round(16 * moved_outline(outline, centre, motion)).astype(np.int32)
+        corners = np.round(16 * transform_outline(outline, centre, motion)).astype(np.int32)
         cv2.polylines(drawn, [corners], True, _ORANGE, 1, cv2.LINE_AA, 4)
     with write_atomically(args.out) as aside:
         aside.write_text("\n".join(rows) + "\n", encoding="utf-8")
@@ -206,7 +206,7 @@ def _import(path: Path, args: argparse.Namespace) -> None:
     out, design = folder / f"{name}_recording.yaml", folder / f"{name}_design.nc"
     text = import_video.recording_text(described, shown.resolve(), design.name)
     if out.exists() and out.read_text(encoding="utf-8") != text:
-        raise _there_is_one(out)
+        raise _already_exists(out)
     described_by = provenance.file_hash(path)
     if design.exists() and not _is_imported(design):
         raise UserError("there is a design already", file=design, remedy="remove it, or --out-dir")
@@ -222,14 +222,14 @@ def _import(path: Path, args: argparse.Namespace) -> None:
 
 
 def _is_imported(path: Path) -> bool:
-    """Tells whether a design was imported from a description, which may have changed since."""
+    """Tests whether a design was imported from a description, which may have changed since."""
     with suppress(UserError):
         parents = json.loads(datasets.read(path, "design").attrs["parents"])
         return list(parents) == ["description"]
     return False
 
 
-def _there_is_one(out: Path) -> UserError:
+def _already_exists(out: Path) -> UserError:
     return UserError("there is a recording already", file=out, remedy="remove it, or --out-dir")
 
 
@@ -245,10 +245,10 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     parents, log = {"design": source, "video": video}, None
     if asked.load_cell is not None:
         held = parents["load_cell"] = path.parent / asked.load_cell.file
-        log = _logged(asked, asked.load_cell, held, video)
+        log = _read_load_log(asked, asked.load_cell, held, video)
     out, partial = args.out, args.out.with_name(f"{args.out.stem}_partial.nc")
     table, other = (track_table_path(each, path, *parents.values()) for each in (out, partial))
-    track = followed(asked, design, video, path)
+    track = track_recording(asked, design, video, path)
     force = None
     if log is not None and asked.load_cell is not None:
         resting = track.resting if asked.load_cell.zero == "start" else 0
@@ -285,7 +285,9 @@ def _check_driven(design: xr.Dataset, source: Path) -> None:
     raise UserError(what, file=source, key="load_axis", value="driven displacement", remedy=remedy)
 
 
-def _logged(asked: Recording, cell: LoadCellLog, held: Path, video: Path) -> load_cell.ForceLog:
+def _read_load_log(
+    asked: Recording, cell: LoadCellLog, held: Path, video: Path
+) -> load_cell.ForceLog:
     """Reads a load cell's log, refused before the tracking if it holds nothing of the video."""
     log = load_cell.read(held, cell)
     end = np.inf if asked.window.end is None else asked.window.end
@@ -348,7 +350,7 @@ def warn_of_times(time: Floats, timing: Ints, video: Path) -> None:
         LOG.warning("the frame rate varies; times are the file's own stamps")
 
 
-def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) -> Track:
+def track_recording(asked: Recording, design: xr.Dataset, video: Path, source: Path) -> Track:
     """The track of a recording, told about in a line at its end.
 
     Raises:

@@ -52,7 +52,7 @@ def work(args: argparse.Namespace) -> None:
 
 
 def variants(asked: Problem) -> dict[str, Problem]:
-    """The problem as run first, then otherwise alike ones; all show the loads of the run."""
+    """Lists the problem as run, then its variants; all show the loads of the run."""
     steps = asked.horizon.steps
     assert steps is not None
     shown = asked.response.model_copy(update={"samples": steps + 1})
@@ -70,7 +70,7 @@ def variants(asked: Problem) -> dict[str, Problem]:
 
 
 def checks(asked: Problem, folder: Path, design: xr.Dataset, threads: int = 1) -> xr.Dataset:
-    """The dataset ``verification``; a variant that cannot be simulated keeps its reason.
+    """Makes the dataset ``verification``; a variant that cannot be simulated keeps its reason.
 
     Raises:
         StoppedError: a structure cannot be simulated as it was run.
@@ -105,7 +105,9 @@ def _finer_loads(
     as_run = tables[AS_RUN]
     found = {
         name: {
-            structure: _numbers(cases, as_run[structure], asked, _share(asked, posed[name]))
+            structure: _check_result(
+                cases, as_run[structure], asked, _loss_scale(asked, posed[name])
+            )
             for structure, cases in table.items()
         }
         for name, table in tables.items()
@@ -113,7 +115,7 @@ def _finer_loads(
     return found, status
 
 
-def _share(asked: Problem, variant: Problem) -> float:
+def _loss_scale(asked: Problem, variant: Problem) -> float:
     """Scales the loss of a variant to be comparable: that of mimicking is a sum over the steps."""
     mimics = asked.objective.target == "intact" and asked.objective.kind == "displacement"
     assert asked.horizon.steps is not None
@@ -121,7 +123,7 @@ def _share(asked: Problem, variant: Problem) -> float:
     return float(np.sqrt(asked.horizon.steps / variant.horizon.steps)) if mimics else 1.0
 
 
-def _numbers(
+def _check_result(
     cases: list[CaseResult], as_run: list[CaseResult], asked: Problem, share: float
 ) -> CheckResult:
     apart = [

@@ -1,4 +1,4 @@
-"""Stage: simulates the specimen of a virtual recording, off its design as those of labs are."""
+"""Stage: simulates the imperfect specimen of a virtual recording."""
 
 import argparse
 
@@ -39,14 +39,16 @@ def work(args: argparse.Namespace) -> None:
     asked = problem.load(args.problem, args.preset)
     held = structures_of(scene_of(asked, args.problem.parent), read_design(asked, args.design))
     with found_in(args.recording):
-        made = dataset(asked, held, recording)
+        made = specimen_dataset(asked, held, recording)
     origin = provenance.of_study(asked, "virtual_specimen", parents={"design": args.design})
     told = {"recording": recording.model_dump_json(), "synthetic": "yes"}
     datasets.write(made, args.out, "specimen", origin | told)
 
 
-def dataset(asked: Problem, held: dict[str, PosedStructure], recording: Recording) -> xr.Dataset:
-    """The dataset ``specimen``: what a recording's specimen does under its load case.
+def specimen_dataset(
+    asked: Problem, held: dict[str, PosedStructure], recording: Recording
+) -> xr.Dataset:
+    """Makes the dataset ``specimen``: the response of a recording's specimen to its load case.
 
     Raises:
         UserError: the recording has no specimen, or it cannot be made or simulated.
@@ -56,10 +58,10 @@ def dataset(asked: Problem, held: dict[str, PosedStructure], recording: Recordin
         remedy = "describe the specimen there"
         raise UserError("the recording has no specimen", key="virtual.specimen", remedy=remedy)
     _check_drive(asked)
-    structure = _asked_for(held, recording)
+    structure = _select_structure(held, recording)
     times = _times(asked, structure.scene, virtual.specimen.unload)
     made = make_specimen(structure, recording.case, virtual.specimen, times[-1])
-    return _described(asked, held["altered"].scene, made, recording.case, times)
+    return _assemble(asked, held["altered"].scene, made, recording.case, times)
 
 
 def _check_drive(asked: Problem) -> None:
@@ -73,7 +75,7 @@ def _check_drive(asked: Problem) -> None:
         raise UserError(what, key="virtual.specimen", remedy=remedy)
 
 
-def _asked_for(held: dict[str, PosedStructure], recording: Recording) -> PosedStructure:
+def _select_structure(held: dict[str, PosedStructure], recording: Recording) -> PosedStructure:
     structure = held.get(recording.structure)
     if structure is None:
         remedy = f"give one of: {', '.join(held)}"
@@ -100,12 +102,12 @@ def _times(asked: Problem, scene: Scene, unload: bool) -> Floats:
     return np.concatenate([times, 2 * times[-1] - times[-2::-1]])
 
 
-def _described(
+def _assemble(
     asked: Problem, altered: Scene, made: PosedStructure, case: int, times: Floats
 ) -> xr.Dataset:
     scene, vertices = made
     intact, lattice = lattice_of(asked), scene.lattice
-    motion, force = _simulated(made, times)
+    motion, force = _simulate(made, times)
     drive = motion[:, scene.loads.driven, :2].mean(axis=1)
     variables = {
         **network_variables(asked, altered),
@@ -126,8 +128,8 @@ def _described(
     return xr.Dataset(variables, coordinates)
 
 
-def _simulated(made: PosedStructure, times: Floats) -> tuple[Floats, Floats]:
-    """Displacement (n_times, n_units, 3) and force of the drive (n_times, 2), N."""
+def _simulate(made: PosedStructure, times: Floats) -> tuple[Floats, Floats]:
+    """Simulates displacement (n_times, n_units, 3) and force of the drive (n_times, 2), N."""
     scene, vertices = made
     try:
         response = simulate(scene, vertices=vertices, times=times)

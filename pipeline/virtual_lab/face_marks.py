@@ -12,7 +12,7 @@ from sim.core import Floats, Ints
 
 _GAP = 0.25  # least distance of two speckles, in diameters
 _TRIES = 12  # for each speckle that would fit
-_RIM = 0.15  # mm between a speckle and the rim of the face
+_RIM_WIDTH = 0.15  # mm between a speckle and the rim of the face
 
 
 class FaceMarks(NamedTuple):
@@ -23,7 +23,9 @@ class FaceMarks(NamedTuple):
     diameter: Floats  # (marks,) mm
 
 
-def draw_marks(specimen: SpecimenOutlines, kind: str, look: UnitAppearance, seed: int) -> FaceMarks:
+def draw_marks(
+    specimen: SpecimenOutlines, kind: str, appearance: UnitAppearance, seed: int
+) -> FaceMarks:
     """Draws the marks of all units of a kind of specimen: dots, speckle or bare."""
     of_unit = {"dots": _dots, "speckle": _speckle}.get(kind)
     found = (
@@ -32,7 +34,9 @@ def draw_marks(specimen: SpecimenOutlines, kind: str, look: UnitAppearance, seed
         else [
             (unit, *disc)
             for unit in range(specimen.count)
-            for disc in of_unit(specimen.polygon(unit), look, np.random.default_rng([seed, unit]))
+            for disc in of_unit(
+                specimen.polygon(unit), appearance, np.random.default_rng([seed, unit])
+            )
         ]
     )
     table = np.array(found, float).reshape(-1, 4)
@@ -42,19 +46,21 @@ def draw_marks(specimen: SpecimenOutlines, kind: str, look: UnitAppearance, seed
 Disc = tuple[float, float, float]
 
 
-def _dots(outline: Floats, look: UnitAppearance, random: np.random.Generator) -> list[Disc]:
+def _dots(outline: Floats, appearance: UnitAppearance, random: np.random.Generator) -> list[Disc]:
     del random
     return [
         (*circle.centre, circle.diameter)
-        for circle in tracking_dots.dots(shapely.Polygon(outline), look.dots)
+        for circle in tracking_dots.dots(shapely.Polygon(outline), appearance.dots)
     ]
 
 
-def _speckle(outline: Floats, look: UnitAppearance, random: np.random.Generator) -> list[Disc]:
+def _speckle(
+    outline: Floats, appearance: UnitAppearance, random: np.random.Generator
+) -> list[Disc]:
     """Discs thrown at random that keep apart from those before, until there are enough."""
-    asked: Speckle = look.speckle
+    asked: Speckle = appearance.speckle
     face = shapely.Polygon(outline)
-    free = face.buffer(-(asked.diameter / 2 + _RIM))
+    free = face.buffer(-(asked.diameter / 2 + _RIM_WIDTH))
     wanted = int(asked.density * face.area / (np.pi / 4 * asked.diameter**2))
     low, high = outline.min(axis=0), outline.max(axis=0)
     thrown = random.uniform(low, high, (_TRIES * wanted, 2))

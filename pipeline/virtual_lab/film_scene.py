@@ -27,7 +27,7 @@ class FilmScene(NamedTuple):
     specimen: SpecimenOutlines  # the units
     ligament: Ints  # (ligaments, 2, 2) unit and vertex, as places in the specimen, at either end
     marks: FaceMarks  # on the faces
-    look: UnitAppearance  # shades and thickness
+    appearance: UnitAppearance  # shades and thickness
     view: Viewpoint  # the camera
 
 
@@ -42,13 +42,15 @@ def nested_polygons(scene: FilmScene, pose: Floats) -> NestedPolygons:
 
     `pose` (units, 3) are displacements in mm and rotations in rad.
     """
-    look = scene.look
-    corners = _placed(scene.specimen.outline, np.arange(len(pose)), pose, scene.specimen.centre)
+    appearance = scene.appearance
+    corners = _move_points(
+        scene.specimen.outline, np.arange(len(pose)), pose, scene.specimen.centre
+    )
     faces = np.array([shapely.Polygon(each[~np.isnan(each[:, 0])]) for each in corners])
     layers = [
-        _layer(_sides(scene, faces, corners), look.side - look.board),
-        _layer(faces, look.face - look.side),
-        _discs(scene, pose),
+        _layer(_project_sides(scene, faces, corners), appearance.side - appearance.board),
+        _layer(faces, appearance.face - appearance.side),
+        _project_marks(scene, pose),
     ]
     sizes = np.concatenate([layer.sizes for layer in layers])
     return NestedPolygons(
@@ -58,7 +60,7 @@ def nested_polygons(scene: FilmScene, pose: Floats) -> NestedPolygons:
     )
 
 
-def _placed(points: Floats, unit: Ints, pose: Floats, centre: Floats) -> Floats:
+def _move_points(points: Floats, unit: Ints, pose: Floats, centre: Floats) -> Floats:
     """Moves points (n, m, 2) relative to the centroids of units (n,) with these."""
     cos, sin = np.cos(pose[unit, 2, None]), np.sin(pose[unit, 2, None])
     x, y = points[..., 0], points[..., 1]
@@ -66,18 +68,18 @@ def _placed(points: Floats, unit: Ints, pose: Floats, centre: Floats) -> Floats:
     return np.asarray(turned + (centre + pose[:, :2])[unit, None])
 
 
-def _sides(scene: FilmScene, faces: Floats, corners: Floats) -> Floats:
+def _project_sides(scene: FilmScene, faces: Floats, corners: Floats) -> Floats:
     """Unites faces, side walls and ligaments to one region of polygons."""
     parts = [faces]
-    if depth := scene.look.thickness:
-        parts += _walls(scene, corners, depth)
-    if width := scene.look.ligament:
+    if depth := scene.appearance.thickness:
+        parts += _project_walls(scene, corners, depth)
+    if width := scene.appearance.ligament:
         end = corners[scene.ligament[..., 0], scene.ligament[..., 1]]
         parts.append(shapely.buffer(shapely.linestrings(end), width / 2, cap_style="flat"))
     return np.array([shapely.union_all(np.concatenate(parts))])
 
 
-def _walls(scene: FilmScene, corners: Floats, depth: float) -> list[Floats]:
+def _project_walls(scene: FilmScene, corners: Floats, depth: float) -> list[Floats]:
     """Projects the backs of the units and the walls below their edges on the faces' plane."""
     back = scene.view.behind(corners, depth)
     backs, walls = [], []
@@ -100,13 +102,13 @@ def _layer(shapes: Floats, shade: float) -> _Layer:
     return _Layer(np.delete(points, closing, axis=0), sizes, shade)
 
 
-def _discs(scene: FilmScene, pose: Floats) -> _Layer:
+def _project_marks(scene: FilmScene, pose: Floats) -> _Layer:
     """Draws the marks as polygons of their area."""
     marks = scene.marks
     angle = 2 * np.pi / _CORNERS * np.arange(_CORNERS)
     swell = np.sqrt(angle[1] / np.sin(angle[1]))
     circle = swell * np.column_stack([np.cos(angle), np.sin(angle)])
     discs = marks.centre[:, None] + marks.diameter[:, None, None] / 2 * circle
-    places = _placed(discs, marks.unit, pose, scene.specimen.centre)
+    places = _move_points(discs, marks.unit, pose, scene.specimen.centre)
     sizes = np.full(len(discs), _CORNERS)
-    return _Layer(places.reshape(-1, 2), sizes, scene.look.mark - scene.look.face)
+    return _Layer(places.reshape(-1, 2), sizes, scene.appearance.mark - scene.appearance.face)

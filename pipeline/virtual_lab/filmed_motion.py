@@ -11,8 +11,8 @@ from pipeline.problem.sections import VirtualLoadCell, VirtualRecording
 from pipeline.runtime import UserError
 from sim.core import Floats, Mask
 
-_FINEST = 0.3  # px between the instants of an exposure
-_MOST = 9
+_SMEAR_STEP = 0.3  # px between the instants of an exposure
+_MOST_INSTANTS = 9
 _NOISE_STREAM = 3
 """First word of the seed of a load cell's noise: no frame has it."""
 _TURNING = ("torque", "rotation")
@@ -35,8 +35,8 @@ class FilmClock(NamedTuple):
     still: float  # rest at the video's start, s
     pace: float  # how fast the response's time goes
 
-    def shown(self, instant: Floats) -> Floats:
-        """Times of the response at instants of the video, s."""
+    def response_time(self, instant: Floats) -> Floats:
+        """Maps instants of the video to times of the response, s."""
         moved = self.start + (instant - self.still) * self.pace
         return np.clip(moved, self.start, self.end)
 
@@ -73,19 +73,19 @@ def sample_motion(one: xr.Dataset, present: Mask, asked: VirtualRecording) -> Fi
     time = np.arange(of_video.frames) / asked.rate
 
     def at(instant: Floats) -> Floats:
-        return np.asarray(course(of_video.shown(instant)))
+        return np.asarray(course(of_video.response_time(instant)))
 
     pose = at(time)
-    count = _instants(pose, asked)
+    count = _count_instants(pose, asked)
     offsets = ((np.arange(count) + 0.5) / count - 0.5) * asked.sensor.exposure
     return FilmedMotion(time, pose, at(time[:, None] + offsets))
 
 
-def _instants(pose: Floats, asked: VirtualRecording) -> int:
+def _count_instants(pose: Floats, asked: VirtualRecording) -> int:
     """Counts the instants that make an exposure smooth."""
     step = float(np.abs(np.diff(pose[..., :2], axis=0)).max(initial=0.0))
     smear = step * asked.rate * asked.sensor.exposure / asked.camera.pixel_size
-    return int(np.clip(np.ceil(smear / _FINEST), 1, _MOST))
+    return int(np.clip(np.ceil(smear / _SMEAR_STEP), 1, _MOST_INSTANTS))
 
 
 def load_cell_log(one: xr.Dataset, asked: VirtualRecording, cell: VirtualLoadCell) -> Floats:
@@ -97,7 +97,7 @@ def load_cell_log(one: xr.Dataset, asked: VirtualRecording, cell: VirtualLoadCel
     Raises:
         UserError: the video shows nothing of the response, or the drive has no direction.
     """
-    if _only_turns(one):
+    if _displaces_nothing(one):
         what = "the drive turns its units and has no direction, along which a load cell would weigh"
         remedy = "leave load_cell out, or drive the problem by a displacement or a force"
         raise UserError(what, key="virtual.load_cell", remedy=remedy)
@@ -107,13 +107,13 @@ def load_cell_log(one: xr.Dataset, asked: VirtualRecording, cell: VirtualLoadCel
     of_video = film_clock(given, asked)
     length = cell.offset + of_video.frames / asked.rate
     time = np.arange(int(np.ceil(length * cell.rate)) + 1) / cell.rate
-    pushed = np.interp(of_video.shown(time - cell.offset), given, force)
+    drive_force = np.interp(of_video.response_time(time - cell.offset), given, force)
     random = np.random.default_rng([_NOISE_STREAM, asked.seed])
-    return np.column_stack([time, pushed + cell.noise * random.standard_normal(len(time))])
+    return np.column_stack([time, drive_force + cell.noise * random.standard_normal(len(time))])
 
 
-def _only_turns(one: xr.Dataset) -> bool:
-    """Tells a drive by a moment or a rotation, and a motion that displaces nothing."""
+def _displaces_nothing(one: xr.Dataset) -> bool:
+    """Tests for a drive by a moment or a rotation, and for a motion that displaces nothing."""
     drive = json.loads(one.attrs["problem"]).get("drive", {})
     first = drive.get("drives", [drive])[0]
     return first.get("kind") in _TURNING or not one["drive_displacement"].values.any()

@@ -137,9 +137,9 @@ def sensor_frame(
     The exposure averages `instants` (instants, units, 3); the noise of each frame is its own.
     """
     shades = shade_image(scene, instants, asked.sensor.blur)
-    light = _light(asked.light, shades.shape)
+    light = _illumination(asked.light, shades.shape)
     flicker = 1 + asked.light.flicker * np.sin(2 * np.pi * _MAINS * time)
-    return _noisy(np.clip(shades, 0, 1) * light * flicker, index, asked)
+    return _add_noise(np.clip(shades, 0, 1) * light * flicker, index, asked)
 
 
 def shade_image(scene: FilmScene, instants: Floats, blur: float) -> Floats:
@@ -151,7 +151,7 @@ def shade_image(scene: FilmScene, instants: Floats, blur: float) -> Floats:
     rings = mean_polygons([nested_polygons(scene, pose) for pose in instants])
     fine = rings._replace(points=(rings.points + 0.5) * FINER - 0.5)
     picture = coverage_image(fine, (rows * FINER, columns * FINER))
-    picture += scene.look.board
+    picture += scene.appearance.board
     if blur > 0:
         edge = cv2.BORDER_REPLICATE
         blurred = cv2.GaussianBlur(picture, (0, 0), blur * FINER, borderType=edge)
@@ -161,7 +161,7 @@ def shade_image(scene: FilmScene, instants: Floats, blur: float) -> Floats:
 
 
 @lru_cache(maxsize=1)
-def _light(asked: Lighting, shape: tuple[int, ...]) -> Floats:
+def _illumination(asked: Lighting, shape: tuple[int, ...]) -> Floats:
     """Brightness (rows, columns) of white."""
     rows, columns = shape
     v, u = np.meshgrid(np.linspace(1, -1, rows), np.linspace(-1, 1, columns), indexing="ij")
@@ -169,7 +169,7 @@ def _light(asked: Lighting, shape: tuple[int, ...]) -> Floats:
     return asked.level * tilted * (1 - asked.falloff * (u**2 + v**2) / 2)
 
 
-def _noisy(light: Floats, index: int, asked: VirtualRecording) -> Image:
+def _add_noise(light: Floats, index: int, asked: VirtualRecording) -> Image:
     """Adds shot noise (Gaussian, as for many electrons) and read noise, in steps of 8 bit."""
     sensor = asked.sensor
     electrons = light * sensor.full_well

@@ -41,18 +41,18 @@ class ImperfectDrive(NamedTuple):
         amplitude = xp.hypot(*self.largest)
         along = xp.asarray(self.largest) / amplitude
         far = planned[:, :2] @ along / amplitude
-        bent = planned[:, :2] + self.cross * amplitude * far[:, None] ** 2 * _left(along)
-        turned = xp.cos(self.turn) * bent + xp.sin(self.turn) * _left(bent)
+        bent = planned[:, :2] + self.cross * amplitude * far[:, None] ** 2 * _perpendicular(along)
+        turned = xp.cos(self.turn) * bent + xp.sin(self.turn) * _perpendicular(bent)
         path = self.gain * turned + times[:, None] / self.end * xp.asarray(self.drift)
         angle = self.tilt * far
         cos, sin = xp.cos(angle)[:, None, None] - 1, xp.sin(angle)[:, None, None]
         place = xp.asarray(self.place)
-        swung = cos * place + sin * _left(place)
+        swung = cos * place + sin * _perpendicular(place)
         rotation = xp.broadcast_to((planned[:, 2] + angle)[:, None], swung.shape[:2])
         return xp.concatenate([path[:, None] + swung, rotation[..., None]], axis=2)
 
 
-def _left(vector: Numbers) -> Numbers:
+def _perpendicular(vector: Numbers) -> Numbers:
     """Turns vectors (..., 2) by a right angle counter-clockwise."""
     return vector.__array_namespace__().stack([-vector[..., 1], vector[..., 0]], axis=-1)
 

@@ -20,7 +20,7 @@ from pipeline.virtual_lab.video_writer import encode_video
 from sim.core import Floats, Reals
 
 LEAST = 16
-RESTING = 6  # frames before the motion
+REST_FRAMES = 6  # frames before the motion
 _DEG = 180 / np.pi
 
 
@@ -32,7 +32,7 @@ class PlannedSetup(NamedTuple):
     pitch: float
 
     @property
-    def words(self) -> Mapping[str, str]:
+    def columns(self) -> Mapping[str, str]:
         """Describes the set-up in columns of a table."""
         camera, codec = self.setup.camera, self.setup.codec
         look = self.setup.look
@@ -58,7 +58,7 @@ class ExpectedNoise(NamedTuple):
     pixel: float  # size of a pixel, mm
 
     @property
-    def words(self) -> Mapping[str, str]:
+    def columns(self) -> Mapping[str, str]:
         """Describes the noise in columns of a table."""
         named = {"rmse": self.rmse, "sigma": self.sigma}
         told: dict[str, str] = {}
@@ -79,24 +79,24 @@ class SetupOptions(NamedTuple):
     markers: tuple[float, ...]  # diameters of dots or speckles, mm
 
 
-def setup_combinations(base: PlannedSetup, tried: SetupOptions) -> list[PlannedSetup]:
+def setup_combinations(base: PlannedSetup, options: SetupOptions) -> list[PlannedSetup]:
     """Combines the options in every way; no exposure is longer than a frame lasts.
 
     Raises:
         UserError: a value that makes no sense.
     """
-    for values in (tried.scales, tried.rates, tried.markers):
+    for values in (options.scales, options.rates, options.markers):
         if any(not 0 < value < np.inf for value in values):
             remedy = "give numbers greater than zero"
             raise UserError("not a set-up that can be tried", value=list(values), remedy=remedy)
     columns = (
-        tried.specimens or (base.specimen,),
-        tried.scales or (base.pitch / base.setup.camera.pixel_size,),
-        tried.rates or (base.setup.rate,),
-        [codec(name) for name in tried.codecs] or (base.setup.codec,),
-        tried.markers or (None,),
+        options.specimens or (base.specimen,),
+        options.scales or (base.pitch / base.setup.camera.pixel_size,),
+        options.rates or (base.setup.rate,),
+        [codec(name) for name in options.codecs] or (base.setup.codec,),
+        options.markers or (None,),
     )
-    return [_chosen(base, *values) for values in itertools.product(*columns)]
+    return [_combine(base, *values) for values in itertools.product(*columns)]
 
 
 def codec(name: str) -> Codec:
@@ -113,7 +113,7 @@ def codec(name: str) -> Codec:
         raise UserError("no such codec", key="--codec", value=name, remedy=remedy) from error
 
 
-def _chosen(
+def _combine(
     base: PlannedSetup,
     specimen: str,
     scale: float,
@@ -152,7 +152,7 @@ def expected_noise(
     if count < LEAST:
         raise UserError("too few frames", key="--frames", value=count, remedy=f"give {LEAST}")
     one = select_case(response, structure, case)
-    clip = _clip(choice.setup, one["time"].values, count)
+    clip = _shorten(choice.setup, one["time"].values, count)
     film = prepare_film(one, structure, choice.specimen, clip)
     camera = choice.setup.camera
     known = RecordingSetup(choice.setup.look.thickness, camera.distance)
@@ -161,15 +161,15 @@ def expected_noise(
         encode_video(path, film.images(), choice.setup.rate, choice.setup.codec, {})
         units = film.scene.specimen
         track = track_video(read_frames(path), units, 1 / camera.pixel_size, setup=known)
-    return _compared(film, track.displacement, track.sigma)
+    return _evaluate_noise(film, track.displacement, track.sigma)
 
 
-def _clip(setup: VirtualRecording, given: Floats, count: int) -> VirtualRecording:
+def _shorten(setup: VirtualRecording, given: Floats, count: int) -> VirtualRecording:
     """Clips the set-up to a few frames at rest and then the motion's beginning, at its pace.
 
     The response has samples at the times `given`, s.
     """
-    resting = min(RESTING, count // 2)
+    resting = min(REST_FRAMES, count // 2)
     whole = film_clock(given, setup)
     end = min(whole.start + (count - 1 - resting) / setup.rate * whole.pace, whole.end)
     length = (end - whole.start) / whole.pace
@@ -177,7 +177,7 @@ def _clip(setup: VirtualRecording, given: Floats, count: int) -> VirtualRecordin
     return setup.model_copy(update=shown)
 
 
-def _compared(film: VirtualFilm, found: Reals, sigma: Reals) -> ExpectedNoise:
+def _evaluate_noise(film: VirtualFilm, found: Reals, sigma: Reals) -> ExpectedNoise:
     pixel = film.asked.camera.pixel_size
     scale = np.array([1 / pixel, 1 / pixel, _DEG])
     pose = film.motion.pose[: len(found)]

@@ -22,7 +22,7 @@ def work(args: argparse.Namespace) -> None:
     """
     design = datasets.read(args.design, "design")
     specimen = outlines_of_design(as_built(design, args.structure))
-    found = draw_marks(specimen, args.kind, _look(args), 0)
+    found = draw_marks(specimen, args.kind, _appearance(args), 0)
     index = design[["i", "j"]].sel(unit=specimen.ids)
     names = labels(zip(index["i"].values, index["j"].values, strict=True))
     title = f"{args.out.stem}, {args.structure}"
@@ -32,7 +32,7 @@ def work(args: argparse.Namespace) -> None:
     LOG.info("%s: %d faces on %d pages, %d without a mark", args.out, specimen.count, pages, bare)
 
 
-def _look(args: argparse.Namespace) -> UnitAppearance:
+def _appearance(args: argparse.Namespace) -> UnitAppearance:
     usual = 2.0 if args.kind == "dots" else 1.2
     diameter = usual if args.diameter is None else args.diameter
     for key, value, fits, remedy in (

@@ -53,18 +53,18 @@ def write(
     canvas.setAuthor("metacloak")
     sheet = PdfDocument(canvas, paper, title)
     canvas.setPageSize((sheet.width * POINT, sheet.height * POINT))
-    spots = _spots(specimen, sheet, labels)
-    pages = 1 + max(spot.sheet for spot in spots)
+    spots = _layout(specimen, sheet, labels)
+    pages = 1 + max(place.sheet for place in spots)
     for page in range(pages):
-        here = [spot for spot in spots if spot.sheet == page]
+        here = [place for place in spots if place.sheet == page]
         with sheet.page(f"faces to cut out, {page + 1} of {pages}"):
-            for spot in here:
-                _sticker(sheet, specimen, marks, labels, spot, ink)
+            for place in here:
+                _draw_sticker(sheet, specimen, marks, labels, place, ink)
     canvas.save()
     return pages
 
 
-def _spots(specimen: SpecimenOutlines, sheet: PdfDocument, labels: list[str]) -> list[Spot]:
+def _layout(specimen: SpecimenOutlines, sheet: PdfDocument, labels: list[str]) -> list[Spot]:
     _, _, width, height = sheet.room
     sizes = [np.ptp(specimen.polygon(unit), axis=0) for unit in range(specimen.count)]
     boxes = [(float(x), float(y) + _LABEL) for x, y in sizes]
@@ -76,25 +76,27 @@ def _spots(specimen: SpecimenOutlines, sheet: PdfDocument, labels: list[str]) ->
         raise UserError(what, value=labels[error.part], remedy=remedy) from error
 
 
-def _sticker(
+def _draw_sticker(
     sheet: PdfDocument,
     specimen: SpecimenOutlines,
     marks: FaceMarks,
     labels: list[str],
-    spot: Spot,
+    place: Spot,
     ink: Ink,
 ) -> None:
-    outline = specimen.polygon(spot.part)
+    outline = specimen.polygon(place.part)
     left, low, _, _ = sheet.room
-    origin = np.array([left + spot.x, low + spot.y + _LABEL]) - outline.min(axis=0)
+    origin = np.array([left + place.x, low + place.y + _LABEL]) - outline.min(axis=0)
     face, mark = (INK, _PAPER) if ink == "dark" else (_PAPER, INK)
     sheet.polygon(outline + origin, fill=face)
-    _discs(sheet, origin, marks, spot.part, mark)
-    middle = left + spot.x + float(np.ptp(outline[:, 0])) / 2
-    sheet.text(middle, low + spot.y + 0.6, labels[spot.part], 6, colour=GREY, at="middle")
+    _draw_marks(sheet, origin, marks, place.part, mark)
+    middle = left + place.x + float(np.ptp(outline[:, 0])) / 2
+    sheet.text(middle, low + place.y + 0.6, labels[place.part], 6, colour=GREY, at="middle")
 
 
-def _discs(sheet: PdfDocument, origin: Floats, marks: FaceMarks, unit: int, colour: str) -> None:
+def _draw_marks(
+    sheet: PdfDocument, origin: Floats, marks: FaceMarks, unit: int, colour: str
+) -> None:
     sheet.canvas.setFillColor(colour)
     draw: Callable[..., None] = sheet.canvas.circle
     for (x, y), diameter in zip(

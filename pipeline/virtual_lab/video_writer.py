@@ -15,7 +15,7 @@ from pipeline.runtime import write_atomically
 from sim.core import Image
 
 _TICKS = 90000  # per second: a usual clock of containers
-_BEHIND = 4  # frames that wait for the encoder at most
+_QUEUE_LENGTH = 4  # frames that wait for the encoder at most
 
 
 def encode_video(
@@ -42,13 +42,13 @@ def _write(
     waiting: deque[Future[None]] = deque()
     with ThreadPoolExecutor(1) as thread:
         for index, image in enumerate(images):
-            planes = image if lossless else _planes(image)
+            planes = image if lossless else _to_planes(image)
             if stream is None:
                 stream = _stream(container, planes, rate, codec)
             frame = av.VideoFrame.from_ndarray(planes, format="gray" if lossless else "yuv420p")
             frame.pts, frame.time_base = round(index * _TICKS / rate), Fraction(1, _TICKS)
             waiting.append(thread.submit(_encode, container, stream, frame))
-            if len(waiting) > _BEHIND:
+            if len(waiting) > _QUEUE_LENGTH:
                 waiting.popleft().result()
         for each in waiting:
             each.result()
@@ -63,7 +63,7 @@ def _encode(
     container.mux(stream.encode(frame))
 
 
-def _planes(image: Image) -> Image:
+def _to_planes(image: Image) -> Image:
     """Brightness and, below it, colour at half the resolution; sides are made even."""
     odd = [(0, side % 2) for side in image.shape[:2]] + [(0, 0)] * (image.ndim - 2)
     even = np.pad(image, odd, mode="edge")

@@ -19,12 +19,12 @@ from pipeline.problem import Problem
 from reports.facts.fact_records import Fact, facts_of, percent
 from reports.study import display_name
 from sim.core import Floats
-from sim.energy import counted_from_rest
+from sim.energy import parameters_at_rest
 from sim.scene import foil_strains
 from sim.structure import Lattice, Material, Parameters, arrays_of, parameters_at, shape
 
 _told = facts_of(__file__)
-_counted_from_rest = jax.jit(counted_from_rest)
+_counted_from_rest = jax.jit(parameters_at_rest)
 _strains = jax.jit(foil_strains, static_argnames="thickness")
 
 

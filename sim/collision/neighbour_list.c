@@ -30,7 +30,7 @@ static int64_t position(int64_t a, int64_t b, const ContactArrays *contacts) {
 }
 
 /* Notes the gap of two units nearer than the reach. */
-static void note(int64_t a, int64_t b, const ContactArrays *contacts) {
+static void record_new_pair(int64_t a, int64_t b, const ContactArrays *contacts) {
     const NeighbourCache *cache = &contacts->cache;
     double gap = least(polygons_gap_between(a, b, contacts), contacts->reach);
     int64_t row = position(a, b, contacts);
@@ -76,7 +76,7 @@ static void sweep(const ContactArrays *contacts) {
             Vec d = between(at(cache->centre, one), at(cache->centre, other));
             double within = radius[one] + radius[other] + contacts->reach;
             if (d.x * d.x + d.y * d.y < within * within)
-                note(least_of(one, other), most_of(one, other), contacts);
+                record_new_pair(least_of(one, other), most_of(one, other), contacts);
         }
     }
     free(order);

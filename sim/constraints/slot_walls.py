@@ -1,4 +1,4 @@
-"""Keeps room in units for the slots that hold the ligaments.
+"""Measures the walls in units beside and between the slots that hold ligaments.
 
 A slot goes on along its ligament into a unit, or is turned against it where the design turns slots,
 as shallow as the edges at its vertex allow. Around its inner end there have to be walls, and

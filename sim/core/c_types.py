@@ -68,12 +68,12 @@ def c_name(name: str) -> str:
 
 
 def is_array(hint: Any) -> bool:  # noqa: ANN401  (a type)
-    """Tells whether a type is that of an array."""
+    """Tests whether a type is that of an array."""
     return get_origin(hint) is np.ndarray
 
 
 def is_record(hint: Any) -> bool:  # noqa: ANN401  (a type)
-    """Tells whether a type is a record."""
+    """Tests whether a type is a record."""
     return isinstance(hint, type) and issubclass(hint, tuple) and hasattr(hint, "_fields")
 
 

@@ -24,7 +24,7 @@ _NEEDED = {"avx2", "bmi1", "bmi2", "f16c", "fma", "movbe", "abm"}
 
 @cache
 def can_pin() -> bool:
-    """Tells whether this processor has the level; False where Linux does not list its flags."""
+    """Tests whether this processor has the level; False where Linux does not list its flags."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="ascii", errors="replace").splitlines()
     except OSError:

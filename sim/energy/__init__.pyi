@@ -11,9 +11,9 @@ from .network_arrays import Kinematics as Kinematics
 from .network_arrays import Sensitivity as Sensitivity
 from .observables import Observables as Observables
 from .observables import observe as observe
-from .resting import RestState as RestState
-from .resting import counted_from_rest as counted_from_rest
-from .resting import rest_state as rest_state
+from .prestress import RestState as RestState
+from .prestress import parameters_at_rest as parameters_at_rest
+from .prestress import rest_state as rest_state
 from .system import Bars as Bars
 from .system import System as System
 from .system import Workspace as Workspace

@@ -70,7 +70,7 @@ def edge_energy(vertex: Array, start: Array, end: Array, law: DistanceLaw) -> Ar
     return jnp.where(outside, weight * barrier(height**2, law), 0.0)
 
 
-def placed(motion: Array, polygon: UnitOutline) -> Array:
+def move_polygon(motion: Array, polygon: UnitOutline) -> Array:
     """Vertices (n, 2) of a unit after a motion (3,)."""
     turned = jax.vmap(rotate, (0, None))(jnp.asarray(polygon.corner), motion[2])
     return jnp.asarray(polygon.centroid) + motion[:2] + turned
@@ -84,7 +84,7 @@ def pair_energy(
     Motions (3,) are displacement (mm) and rotation (rad); vertices of the units are counter-
     clockwise.
     """
-    one, other = placed(motion_a, a), placed(motion_b, b)
+    one, other = move_polygon(motion_a, a), move_polygon(motion_b, b)
     between = jnp.vectorize(vertices_energy, signature="(2),(2)->()", excluded={2})
     ends = between(one[:, None], other[None], law)
     return ends.sum() + _edges(one, other, law) + _edges(other, one, law)

@@ -69,7 +69,7 @@ static void *factorise_run(void *given) {
     const Run *run = given;
     const Fronts *f = run->f;
     int64_t next = run->first, child = f->child[run->last], end = f->child[run->last + 1];
-    if (run->threads > 1 && f->apart[run->last]) {
+    if (run->threads > 1 && f->parallel[run->last]) {
         Run one = *run, other = *run;
         one.last = f->children[child], one.threads = run->threads / 2;
         other.threads = run->threads - one.threads;

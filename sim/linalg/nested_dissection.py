@@ -17,9 +17,9 @@ SMALLEST_PART = 8
 """Units that are no longer cut: smaller fronts cost more in calls than they save in fill."""
 
 
-MOST_APART = 2
+MOST_PARALLEL = 2
 """Generations of fronts, from the last one down, whose children may be factorised side by side."""
-LEAST_APART = 1 << 18
+LEAST_PARALLEL_WORK = 1 << 18
 """Numbers of the factor, of a front and all below it, from which that gains more than it costs."""
 
 
@@ -36,7 +36,7 @@ class Fronts(NamedTuple):
     children: Ints  # fronts by parent
     # (n_fronts,) whether threads may factorise side by side what is below each child: runs of
     # fronts that end with one child after another, with scratch memory of their own
-    apart: Ints
+    parallel: Ints
     panel: Ints  # (n_fronts + 1,) where a front's own columns start among the factor's values
     update: Ints  # (n_fronts,) where its boundary's block starts in the scratch memory
     owner: Ints  # (n,) front that eliminates each dof
@@ -136,8 +136,8 @@ def fronts_of(own: list[Ints], boundaries: list[Ints], n_dofs: Ints) -> Fronts:
     heights = np.array([len(row) for row in rows])
     columns = np.diff(first)
     panel = _starts(columns * (columns + heights))
-    apart = _apart(parent, panel)
-    update, scratch = _scratch(heights**2, parent, apart)
+    parallel = _choose_parallel(parent, panel)
+    update, scratch = _scratch(heights**2, parent, parallel)
     return Fronts(
         first=first,
         edge=_starts(heights),
@@ -145,7 +145,7 @@ def fronts_of(own: list[Ints], boundaries: list[Ints], n_dofs: Ints) -> Fronts:
         place=np.concatenate(place),
         child=_starts(n_children),
         children=children,
-        apart=apart,
+        parallel=parallel,
         panel=panel,
         update=update,
         owner=owner,
@@ -162,7 +162,7 @@ def _place(row: Ints, first: int, end: int, boundary: Ints) -> Ints:
     return np.where(row < end, row - first, end - first + np.searchsorted(boundary, row))
 
 
-def _apart(parent: Ints, panel: Ints) -> Ints:
+def _choose_parallel(parent: Ints, panel: Ints) -> Ints:
     """Chooses fronts whose children may be factorised side by side, from the last ones down.
 
     A front that waits for one further up may lie between those below another, where units are
@@ -178,17 +178,19 @@ def _apart(parent: Ints, panel: Ints) -> Ints:
         all(lowest[after] == before + 1 for before, after in pairwise(children))
         for children in below
     ]
-    apart = np.zeros(n, dtype=np.int64)
+    parallel = np.zeros(n, dtype=np.int64)
     latest = below[n] if in_runs[n] else []
-    for _ in range(MOST_APART):
+    for _ in range(MOST_PARALLEL):
         numbers = ((front, panel[front + 1] - panel[lowest[front]]) for front in latest)
-        large = [front for front, number in numbers if number >= LEAST_APART and in_runs[front]]
+        large = [
+            front for front, number in numbers if number >= LEAST_PARALLEL_WORK and in_runs[front]
+        ]
         latest = [child for front in large if len(below[front]) > 1 for child in below[front]]
-        apart[parent[latest]] = 1
-    return apart
+        parallel[parent[latest]] = 1
+    return parallel
 
 
-def _scratch(sizes: Ints, parent: Ints, apart: Ints) -> tuple[Ints, int]:
+def _scratch(sizes: Ints, parent: Ints, parallel: Ints) -> tuple[Ints, int]:
     """Places each front's block while it waits for its parent; returns starts and total size.
 
     Blocks that threads may fill side by side have memory of their own.
@@ -197,7 +199,7 @@ def _scratch(sizes: Ints, parent: Ints, apart: Ints) -> tuple[Ints, int]:
     sharing = np.arange(n)  # the last of the fronts that one shares memory with
     for front in range(n - 1, -1, -1):
         up = parent[front] if parent[front] >= 0 else n - 1
-        if not (apart[front] or apart[up]):
+        if not (parallel[front] or parallel[up]):
             sharing[front] = sharing[up]
     start, total = np.zeros(n, dtype=np.int64), 0
     for last in np.unique(sharing):

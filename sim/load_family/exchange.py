@@ -19,11 +19,11 @@ from sim.constraints import Limits
 from sim.core import Floats
 from sim.load_family.family import LoadFamily
 from sim.load_family.family_losses import LoadLosses
-from sim.load_family.worst_load import APART, FoundLoad, SearchOptions, search_worst
+from sim.load_family.worst_load import LEAST_DISTANCE, FoundLoad, SearchOptions, search_worst
 from sim.optimise import Evaluate, Evaluation, Journal, Result, SqpOptions
 from sim.optimise import minimise as minimise_loss
 from sim.scene import DIRECTED, Scene, combined, constraints_of, make_plan, parameters_of_copies
-from sim.solvers import MotionLaw, Together
+from sim.solvers import MotionLaw, Superposition
 
 LOG = logging.getLogger(__name__)
 
@@ -126,14 +126,14 @@ class LoadSet:
         kept = self._idle < IDLE
         self.added, self._idle = self.added[kept], self._idle[kept]
         for one in found:
-            near = any(np.abs(one.place - other).max() < APART for other in self.places)
+            near = any(np.abs(one.place - other).max() < LEAST_DISTANCE for other in self.places)
             if one.loss >= least and not near:
                 self.added = np.concatenate([self.added, one.place[None]])
                 self._idle = np.append(self._idle, 0)
 
 
-def _directed(motion: MotionLaw) -> DIRECTED | Together:
-    assert isinstance(motion, DIRECTED | Together)
+def _directed(motion: MotionLaw) -> DIRECTED | Superposition:
+    assert isinstance(motion, DIRECTED | Superposition)
     return motion
 
 
@@ -185,10 +185,10 @@ def minimise_worst(
             callback(history[-1])
 
     held.exchange(np.zeros(0), search(x))
-    stands = False
+    settled = False
     while (left := sqp.evaluations - len(history)) > 0:
         first = len(history)
-        descent = _descent_options(sqp, options, left, stands)
+        descent = _descent_options(sqp, options, left, settled)
         result = minimise_loss("sqp", evaluate, constraints, x, options=descent, callback=record)
         x, known = result.x, float(result.aux.max())
         found = search(x, held.places)
@@ -196,12 +196,12 @@ def minimise_worst(
         LOG.info("worst of %d loads %.5g, found %.5g", len(held.places), known, found[0].loss)
         worst, mean = max(known, found[0].loss), float(scene.loads.case_weights @ own)
         merit = (1 - options.nominal) * worst + options.nominal * mean
-        stands = found[0].loss <= FOUND * known
+        settled = found[0].loss <= FOUND * known
         if best is None or merit < best.merit:
-            best = _Best(merit, stands, replace(result, best=first + result.best))
+            best = _Best(merit, settled, replace(result, best=first + result.best))
         held.exchange(added, found)
     assert best is not None
-    if not best.stands:
+    if not best.settled:
         LOG.warning("the worst load found is more than %g times those designed for", FOUND)
     return replace(best.result, evaluations=tuple(history))
 
@@ -210,18 +210,18 @@ class _Best(NamedTuple):
     """Holds the design of the lowest worst loss so far."""
 
     merit: float  # that loss, with the share of the drive's own loads
-    stands: bool  # whether no load was found that is much worse than those in the set
+    settled: bool  # whether no load was found that is much worse than those in the set
     result: Result
 
 
 def _descent_options(
-    sqp: SqpOptions, options: FamilyOptions, left: int, stands: bool
+    sqp: SqpOptions, options: FamilyOptions, left: int, settled: bool
 ) -> SqpOptions:
     """Bounds a descent for the set by the evaluations left; a longer one for a set that stands.
 
     New starts from inside the feasible set are for a set that stands for the family.
     """
-    if stands:
+    if settled:
         return replace(sqp, evaluations=min(left, RESTARTS * options.evaluations))
     return replace(sqp, evaluations=min(left, options.evaluations), retreats=0)
 
@@ -231,7 +231,7 @@ def without_copies(family: LoadFamily, scene: Scene) -> LoadFamily:
     first = family.setups[0]
     low, high = first.direction
     quarter = low + np.pi / 2
-    if len(family.setups) > 1 or high <= quarter or isinstance(first.motion, Together):
+    if len(family.setups) > 1 or high <= quarter or isinstance(first.motion, Superposition):
         return family
     turned = scene.driven_by(*(first.motion._replace(direction=a) for a in (low, quarter)))
     if len(make_plan(turned).simulated) == 2:

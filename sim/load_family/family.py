@@ -10,7 +10,7 @@ from jax import Array
 
 from sim.core import Floats, Ints, Numbers
 from sim.scene import DIRECTED, Scene
-from sim.solvers import Harmonic, MotionLaw, Together
+from sim.solvers import Harmonic, MotionLaw, Superposition
 
 Range = tuple[float, float]
 
@@ -24,7 +24,7 @@ class LoadSetup:
     amplitudes: A cos of the first, A sin of the second.
     """
 
-    motion: DIRECTED | Together  # the drive's
+    motion: DIRECTED | Superposition  # the drive's
     direction: Range  # rad
     amplitude: Range  # mm
     frequency: Range | None = None  # Hz; None for a motion that has none
@@ -52,7 +52,7 @@ class LoadSetup:
             found.append(low * (high / low) ** at[..., 2])
         return jnp.stack(found, axis=-1)
 
-    def place(self, motion: DIRECTED | Together) -> Floats:
+    def place(self, motion: DIRECTED | Superposition) -> Floats:
         """Finds the place (n,) of a motion, in the unit cube or not."""
         along = list(zip(polar(motion), (self.direction, self.amplitude), strict=True))
         if self.frequency is not None:
@@ -66,7 +66,7 @@ class LoadSetup:
 
     @property
     def varied(self) -> tuple[bool, ...]:
-        """Tells which of the numbers of a load are in ranges, and not single values."""
+        """Marks the numbers of a load that are in ranges, and not single values."""
         ranges = (self.direction, self.amplitude, self.frequency)
         return tuple(each[0] < each[1] for each in ranges if each is not None)
 
@@ -77,7 +77,7 @@ class LoadSetup:
         below = np.log2(self.frequency[1] / float(self.numbers(place)[2]))
         return int(np.floor(below + 1e-9))
 
-    def fastest(self, octave: int) -> DIRECTED | Together:
+    def fastest(self, octave: int) -> DIRECTED | Superposition:
         """Returns the largest motion with the highest frequency of an octave.
 
         What else has a duration keeps its number of periods.
@@ -96,13 +96,13 @@ class LoadSetup:
 
         The region of interest is the set-up's too: what another drive moves is not to rest.
         """
-        return scene if self.scene is None else _in_setup(scene, self.scene)
+        return scene if self.scene is None else _with_setup(scene, self.scene)
 
 
-def _in_setup(scene: Scene, setup: Scene) -> Scene:
+def _with_setup(scene: Scene, setup: Scene) -> Scene:
     """Takes loads and region from the scene of a set-up, for the reference as well."""
     own, other = scene.objective.reference, setup.objective.reference
-    reference = _in_setup(own, other) if own and other else own
+    reference = _with_setup(own, other) if own and other else own
     made = replace(scene, loads=setup.loads)
     return made.updated(region=setup.objective.region, reference=reference)
 
@@ -137,7 +137,7 @@ class LoadFamily:
         each = np.stack([np.asarray(one.numbers(places)) for one in self.setups])
         return np.take_along_axis(each, self.number(places)[None, ..., None], axis=0)[0]
 
-    def place(self, motion: DIRECTED | Together) -> Floats:
+    def place(self, motion: DIRECTED | Superposition) -> Floats:
         """Finds the place (n,) of a motion of the first set-up, in the unit cube or not."""
         return self.centred(np.append(self.setups[0].place(motion), [0.0] * (len(self.setups) > 1)))
 
@@ -156,24 +156,26 @@ class LoadFamily:
 
 
 def directed(
-    motion: DIRECTED | Together, direction: float | Array, amplitude: float | Array
-) -> DIRECTED | Together:
+    motion: DIRECTED | Superposition, direction: float | Array, amplitude: float | Array
+) -> DIRECTED | Superposition:
     """Turns a motion along a direction (rad) with an amplitude (mm), or mixes two so."""
-    if not isinstance(motion, Together):
+    if not isinstance(motion, Superposition):
         return motion._replace(direction=direction, amplitude=amplitude)
     parts = (amplitude * jnp.cos(direction), amplitude * jnp.sin(direction))
     mixed = zip(motion.motions, parts, strict=True)
-    return motion._replace(motions=tuple(_one(one)._replace(amplitude=part) for one, part in mixed))
+    return motion._replace(
+        motions=tuple(_single_motion(one)._replace(amplitude=part) for one, part in mixed)
+    )
 
 
-def polar(motion: DIRECTED | Together) -> tuple[float, float]:
+def polar(motion: DIRECTED | Superposition) -> tuple[float, float]:
     """Returns direction, rad, and amplitude, mm, of a motion or a mixture of two."""
-    if not isinstance(motion, Together):
+    if not isinstance(motion, Superposition):
         return float(motion.direction), float(motion.amplitude)
-    first, second = (float(_one(one).amplitude) for one in motion.motions)
+    first, second = (float(_single_motion(one).amplitude) for one in motion.motions)
     return float(np.arctan2(second, first)), float(np.hypot(first, second))
 
 
-def _one(motion: MotionLaw) -> DIRECTED:
+def _single_motion(motion: MotionLaw) -> DIRECTED:
     assert isinstance(motion, DIRECTED)
     return motion

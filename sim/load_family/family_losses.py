@@ -90,7 +90,7 @@ class LoadLosses:
             return self._octaves[key]
 
 
-class _Posed(NamedTuple):
+class _PosedScene(NamedTuple):
     """Holds a scene and its solver."""
 
     scene: Scene
@@ -123,12 +123,12 @@ class _Octave:
             duration *= float(setup.motion.frequency) / top
         # explicit steps would have to be stable for the lowest frequency of the octave
         posed = scene.under((fastest,), duration, top, integrator="implicit")
-        self._posed = _Posed(posed, make_plan(posed, every_case=True).solver)
-        self._intact: tuple[_Posed, Parameters[Any]] | None = None
+        self._posed = _PosedScene(posed, make_plan(posed, every_case=True).solver)
+        self._intact: tuple[_PosedScene, Parameters[Any]] | None = None
         if (intact := posed.objective.reference) is not None:
             plan = make_plan(intact, intact.lattice.vertices, every_case=True)
             values = concrete_parameters(intact, intact.lattice.vertices)
-            self._intact = _Posed(intact, plan.solver), values
+            self._intact = _PosedScene(intact, plan.solver), values
 
         def load(place: Array) -> tuple[MotionLaw, Array, Array]:
             direction, amplitude, *frequency = setup.numbers(place)

@@ -11,7 +11,7 @@ from sim.load_family.family import LoadFamily
 
 LOG = logging.getLogger(__name__)
 
-APART = 0.02
+LEAST_DISTANCE = 0.02
 """Distance of two places along an axis of the unit cube below which they are one load."""
 
 
@@ -107,7 +107,7 @@ def search_worst(
     order = np.argsort([-tried(start) for start in starts], kind="stable")
     chosen: list[Floats] = []
     for start in (starts[k] for k in order):
-        if all(np.abs(start - other).max() > 10 * APART for other in chosen):
+        if all(np.abs(start - other).max() > 10 * LEAST_DISTANCE for other in chosen):
             chosen.append(start)
     found = [ascend(loss, start, options.evaluations) for start in chosen[: options.ascents]]
     return sorted(found, key=lambda each: -each.loss)

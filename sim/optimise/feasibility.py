@@ -1,4 +1,4 @@
-"""Projects designs on the feasible set by the shortest way."""
+"""Projects designs on the feasible set by shortest Newton steps."""
 
 import logging
 
@@ -22,8 +22,8 @@ PATIENCE = 3
 They are counted anew where a margin comes in sight, which was infinite, as loads beyond a snap are.
 """
 
-RETREAT_STEPS = 10
-"""Number of steps in which a retreat deepens."""
+DEPTH_STEPS = 10
+"""Number of steps in which the margins of an interior design grow."""
 
 log = logging.getLogger(__name__)
 
@@ -46,14 +46,14 @@ def project(
     try:
         before = place = problem.place(np.clip(x, problem.lower, problem.upper))
         for _ in range(rounds):
-            if _comes_in_sight(before, place):
+            if _became_finite(before, place):
                 missing.clear()
             missing.append(depth - float(place.values.min(initial=np.inf)))
             if missing[-1] <= 0.0:
                 return place
             if len(missing) > patience and missing[-1] > 0.5 * missing[-1 - patience]:
                 return None
-            step = _newton(problem, place, reach, depth + INSET)
+            step = _newton_step(problem, place, reach, depth + INSET)
             if step is None:
                 return None
             ahead = np.clip(place.x + step, problem.lower, problem.upper)
@@ -63,12 +63,12 @@ def project(
     return place if place.values.min(initial=np.inf) >= depth else None
 
 
-def _comes_in_sight(before: ConstraintPoint, place: ConstraintPoint) -> bool:
-    """Tells whether the worst margin of a place was infinite at the place before."""
+def _became_finite(before: ConstraintPoint, place: ConstraintPoint) -> bool:
+    """Tests whether the worst margin of a design was infinite at the one before."""
     return len(place.values) > 0 and bool(np.isinf(before.values[place.values.argmin()]))
 
 
-def _newton(
+def _newton_step(
     problem: CountedProblem, place: ConstraintPoint, reach: float, depth: float
 ) -> Floats | None:
     near = reachable(place.values - depth, place.jacobian, reach)
@@ -82,7 +82,7 @@ def _newton(
     return None if found is None else found.step
 
 
-def retreat(
+def interior_design(
     problem: CountedProblem, x: Floats, depth: float, reach: float
 ) -> ConstraintPoint | None:
     """Finds a design inside the feasible set, every margin at ``depth`` or as near as it goes.
@@ -90,18 +90,18 @@ def retreat(
     The way is followed in small steps, so that it leads to the part of the set that ``x`` is in.
     """
     place = project(problem, x, reach)
-    for level in np.linspace(0.0, depth, RETREAT_STEPS + 1)[1:]:
-        deeper = None if place is None else project(problem, place.x, reach, depth=level)
-        if deeper is None:
+    for level in np.linspace(0.0, depth, DEPTH_STEPS + 1)[1:]:
+        inner = None if place is None else project(problem, place.x, reach, depth=level)
+        if inner is None:
             break
-        place = deeper
+        place = inner
     return place
 
 
 def feasible_design(constrain: Constrain, x: Floats, reach: float, rounds: int) -> Floats | None:
     """Projects a design vector on the feasible set; None if no round leads there."""
-    anywhere = np.full(len(x), np.inf)
-    place = project(CountedProblem(_no_loss, constrain, -anywhere, anywhere, 0), x, reach, rounds)
+    unbounded = np.full(len(x), np.inf)
+    place = project(CountedProblem(_no_loss, constrain, -unbounded, unbounded, 0), x, reach, rounds)
     return None if place is None else place.x
 
 
@@ -110,7 +110,7 @@ def _no_loss(design: Floats) -> tuple[float, Floats, Floats]:
 
 
 def feasible_start(problem: CountedProblem, x: Floats, reach: float) -> ConstraintPoint:
-    """Projects as ``project`` does, in many rounds and ever longer steps, and tells of the move.
+    """Projects as ``project`` does, in many rounds and ever longer steps; logs the move.
 
     Raises:
         InfeasibleStartError: naming the worst constraint.
@@ -118,14 +118,14 @@ def feasible_start(problem: CountedProblem, x: Floats, reach: float) -> Constrai
     for factor in (1, 4, 16):
         place = project(problem, x, factor * reach, rounds=50, patience=50)
         if place is not None:
-            _tell_of_move(problem, place)
+            _log_move(problem, place)
             return place
     start = problem.place(np.clip(x, problem.lower, problem.upper))
     worst = int(np.argmin(start.values))
     raise InfeasibleStartError(worst, -float(start.values[worst]))
 
 
-def _tell_of_move(problem: CountedProblem, place: ConstraintPoint) -> None:
+def _log_move(problem: CountedProblem, place: ConstraintPoint) -> None:
     """Logs how far a start was moved, and which constraint it misses most."""
     start = problem.start
     if start is None or start.violation == 0.0:

@@ -76,8 +76,8 @@ class Journal:
             ) from None
         first = self._read()
         if first != self.key.encode():
-            self._put_aside()
-            self._cut(0)
+            self._back_up()
+            self._truncate(0)
             self._write(self.key.encode())
         self.replayed = 0
         return self
@@ -92,24 +92,24 @@ class Journal:
             self._file.close()
             self._file = None
 
-    def _put_aside(self) -> None:
+    def _back_up(self) -> None:
         """Copies evaluations of another key to a file beside; none is read from there."""
         kept = self.path.with_name(f"{self.path.name}.old")
         content = self.path.read_bytes()
-        dropped = sum(1 for _ in iter(self._read, None))
-        if dropped:
+        count = sum(1 for _ in iter(self._read, None))
+        if count:
             kept.write_bytes(content)
             what = "evaluations of another problem or program"
-            log.warning("%s: %d %s, kept as %s; starting anew", self.path, dropped, what, kept.name)
+            log.warning("%s: %d %s, kept as %s; starting anew", self.path, count, what, kept.name)
 
     def wrap(self, evaluate: Evaluate, holder: Stateful | None = None) -> Evaluate:
-        """Gives ``evaluate`` a memory: reads its results back while the journal holds them.
+        """Wraps ``evaluate``: reads its results back while the journal holds them.
 
         With them comes back the state in which the evaluation, or its failure, left ``holder``.
         """
 
-        def remembered(x: Floats) -> tuple[float, Floats, Floats]:
-            start = self._open.tell()
+        def replayed(x: Floats) -> tuple[float, Floats, Floats]:
+            start = self._opened.tell()
             payload = self._read()
             if payload is not None and _design(payload) == x.tobytes():
                 self.replayed += 1
@@ -118,13 +118,13 @@ class Journal:
                 return _outcome(payload)
             if payload is not None:
                 log.warning("%s: evaluation %d differs, continuing anew", self.path, self.replayed)
-                self._cut(start)
+                self._truncate(start)
             return self._compute(evaluate, x, holder)
 
-        return remembered
+        return replayed
 
     @property
-    def _open(self) -> BinaryIO:
+    def _opened(self) -> BinaryIO:
         if self._file is None:
             raise RuntimeError("the journal is not open: use it in a with statement")
         return self._file
@@ -146,31 +146,31 @@ class Journal:
 
     def _read(self) -> bytes | None:
         """Reads the next payload, None at the end; cuts off what cannot be read."""
-        start = self._open.tell()
-        header = self._open.read(_HEADER.size)
+        start = self._opened.tell()
+        header = self._opened.read(_HEADER.size)
         if len(header) == _HEADER.size:
             magic, length, checksum = _HEADER.unpack(header)
-            if magic == _MAGIC and length <= self._size - self._open.tell():
-                payload = self._open.read(length)
+            if magic == _MAGIC and length <= self._size - self._opened.tell():
+                payload = self._opened.read(length)
                 if zlib.crc32(payload) == checksum:
                     return payload
-        self._cut(start)
+        self._truncate(start)
         return None
 
     @property
     def _size(self) -> int:
-        return os.fstat(self._open.fileno()).st_size
+        return os.fstat(self._opened.fileno()).st_size
 
-    def _cut(self, position: int) -> None:
+    def _truncate(self, position: int) -> None:
         if self._size > position:
-            self._open.truncate(position)
-            os.fsync(self._open.fileno())
-        self._open.seek(position)
+            self._opened.truncate(position)
+            os.fsync(self._opened.fileno())
+        self._opened.seek(position)
 
     def _write(self, payload: bytes) -> None:
-        self._open.write(_HEADER.pack(_MAGIC, len(payload), zlib.crc32(payload)) + payload)
-        self._open.flush()
-        os.fsync(self._open.fileno())
+        self._opened.write(_HEADER.pack(_MAGIC, len(payload), zlib.crc32(payload)) + payload)
+        self._opened.flush()
+        os.fsync(self._opened.fileno())
 
 
 def _encode(
@@ -189,12 +189,12 @@ def _encode(
         "failure": None if failure is None else str(failure),
     }
     if failure is not None:
-        shapes |= {"step": _whole(failure.step), "unit": _whole(failure.unit)}
+        shapes |= {"step": _as_int(failure.step), "unit": _as_int(failure.unit)}
     numbers = np.concatenate([x, [loss], gradient, aux.ravel(), state]).astype("<f8")
     return json.dumps(shapes).encode() + b"\n" + numbers.tobytes()
 
 
-def _whole(number: int | None) -> int | None:
+def _as_int(number: int | None) -> int | None:
     return None if number is None else int(number)  # JSON knows no integers of NumPy
 
 

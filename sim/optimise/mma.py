@@ -33,7 +33,7 @@ MOVE = 0.9
 SOFTEN, STIFFEN = 0.1, 10.0
 """Factor of the stiffness from one design to the next; its largest growth in one correction."""
 
-ENOUGH = 0.1
+LEAST_REDUCTION = 0.1
 """Share of the expected decrease with which a step is kept although the loss was underestimated."""
 
 CORRECTIONS = 3
@@ -107,10 +107,10 @@ class Approximation:
 
 @dataclass(frozen=True)
 class MmaTrial:
-    """Holds a feasible design that the replacements propose, and the loss promised there."""
+    """Holds a feasible design that the replacements propose, and the loss predicted there."""
 
     place: ConstraintPoint
-    promised: float
+    predicted: float
 
 
 def mma(problem: CountedProblem, x0: Floats, options: MmaOptions) -> Result:
@@ -154,25 +154,25 @@ class _Run:
     def outer(self) -> None:
         """Makes one accepted move, with as many corrections as it takes."""
         model = Approximation(self.point, self.distance, self.stiffness)
-        refused, stuck = np.zeros(0), False
+        rejected, stuck = np.zeros(0), False
         while self.problem.finished is None and self.reason is None:
             trial = self._next(model)
             if trial is None:
                 continue
-            stuck = stuck or np.array_equal(trial.place.x, refused)
-            if stuck and trial.promised >= self.point.loss:
-                self._come_closer()
+            stuck = stuck or np.array_equal(trial.place.x, rejected)
+            if stuck and trial.predicted >= self.point.loss:
+                self._tighten_asymptotes()
                 continue
             outcome = self.problem.simulate(trial.place)
-            if isinstance(outcome, EvaluatedPoint) and self._keeps(trial, outcome):
+            if isinstance(outcome, EvaluatedPoint) and self._is_acceptable(trial, outcome):
                 self._move(trial, outcome)
                 return
             self.problem.record(
                 trial.place, outcome, False, float(self.distance.max()), self.residual
             )
-            refused = trial.place.x
+            rejected = trial.place.x
             if isinstance(outcome, EvaluatedPoint):
-                shortfall = np.array([outcome.loss - trial.promised])
+                shortfall = np.array([outcome.loss - trial.predicted])
                 model.correct(np.zeros(1, dtype=int), outcome.x, shortfall)
             else:
                 self.distance *= SLOWER**2
@@ -185,15 +185,15 @@ class _Run:
             self.reason = str(error)
             return None
         except SimulationError:  # of the constraints: they know of no design so far away
-            self._come_closer()
+            self._tighten_asymptotes()
             return None
         if trial is None or self._length(trial.place) < self.options.step_min:
             self.reason = "no further progress"
             return None
         return trial
 
-    def _come_closer(self) -> None:
-        """Brings the poles closer; the end if that leaves no room for a step."""
+    def _tighten_asymptotes(self) -> None:
+        """Tightens the asymptotes; ends the run if that leaves no room for a step."""
         self.distance *= SLOWER**2
         if self.distance.max() < self.options.step_min:
             self.reason = "no further progress"
@@ -201,9 +201,9 @@ class _Run:
     def _length(self, place: ConstraintPoint) -> float:
         return float(np.abs(place.x - self.point.x).max())
 
-    def _keeps(self, trial: MmaTrial, outcome: EvaluatedPoint) -> bool:
-        expected = self.point.loss - trial.promised
-        return self.point.loss - outcome.loss >= ENOUGH * expected > 0
+    def _is_acceptable(self, trial: MmaTrial, outcome: EvaluatedPoint) -> bool:
+        expected = self.point.loss - trial.predicted
+        return self.point.loss - outcome.loss >= LEAST_REDUCTION * expected > 0
 
     def _move(self, trial: MmaTrial, outcome: EvaluatedPoint) -> None:
         used = float(self.distance.max())

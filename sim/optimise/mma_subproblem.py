@@ -92,10 +92,10 @@ class _State:
     x: Floats  # (n,) variables
     y: Floats  # (m,) elastic variables of the constraints
     slack: Floats  # (m,) their slacks
-    price: Floats  # (m,) multipliers of the constraints
-    floor: Floats  # (m,) multipliers of y >= 0
-    left: Floats  # (n,) multipliers of the lower bounds
-    right: Floats  # (n,) of the upper bounds
+    multiplier: Floats  # (m,) multipliers of the constraints
+    y_multiplier: Floats  # (m,) multipliers of y >= 0
+    low_multiplier: Floats  # (n,) multipliers of the lower bounds
+    high_multiplier: Floats  # (n,) of the upper bounds
 
     def moved(self, step: _State, length: float) -> _State:
         return _State(
@@ -117,7 +117,7 @@ def minimise_separable(problem: Separable, tolerance: float = 1e-8) -> tuple[Flo
         residual = solver.residual(state, barrier)
         if np.abs(residual).max() < 0.9 * barrier:
             if barrier <= tolerance:
-                return state.x, state.price * scale
+                return state.x, state.multiplier * scale
             barrier /= 10
         state = solver.advance(state, barrier)
     raise UnsolvedError("the subproblem of moving asymptotes did not converge")
@@ -153,23 +153,25 @@ class _InteriorPoint:
 
     def residual(self, state: _State, barrier: float) -> Floats:
         """Evaluates the optimality conditions, with complementarity relaxed to ``barrier``."""
-        problem, weights = self.problem, np.concatenate([[1.0], state.price])
+        problem, weights = self.problem, np.concatenate([[1.0], state.multiplier])
         return np.concatenate(
             [
-                problem.summed(problem.entries(state.x), weights) - state.left + state.right,
-                WEIGHT - state.price - state.floor,
+                problem.summed(problem.entries(state.x), weights)
+                - state.low_multiplier
+                + state.high_multiplier,
+                WEIGHT - state.multiplier - state.y_multiplier,
                 problem.values(state.x)[1:] - state.y + state.slack,
-                state.left * (state.x - problem.low) - barrier,
-                state.right * (problem.high - state.x) - barrier,
-                state.floor * state.y - barrier,
-                state.price * state.slack - barrier,
+                state.low_multiplier * (state.x - problem.low) - barrier,
+                state.high_multiplier * (problem.high - state.x) - barrier,
+                state.y_multiplier * state.y - barrier,
+                state.multiplier * state.slack - barrier,
             ]
         )
 
     def advance(self, state: _State, barrier: float) -> _State:
         """Takes one damped Newton step towards the central path."""
         step = self._newton(state, barrier)
-        length = self._room(state, step)
+        length = self._longest_step(state, step)
         before = np.linalg.norm(self.residual(state, barrier))
         for _ in range(50):
             trial = state.moved(step, length)
@@ -181,52 +183,69 @@ class _InteriorPoint:
     def _newton(self, state: _State, barrier: float) -> _State:
         problem = self.problem
         below, above = state.x - problem.low, problem.high - state.x
-        weights = np.concatenate([[1.0], state.price])
+        weights = np.concatenate([[1.0], state.multiplier])
         slopes = problem.slopes(state.x)
-        diagonal = problem.curvature(state.x, weights) + state.left / below + state.right / above
-        give = state.slack / state.price + state.y / state.floor
-        push = -(problem.summed(slopes.data, weights) - barrier / below + barrier / above)
-        pull = -(
+        diagonal = (
+            problem.curvature(state.x, weights)
+            + state.low_multiplier / below
+            + state.high_multiplier / above
+        )
+        compliance = state.slack / state.multiplier + state.y / state.y_multiplier
+        right_x = -(problem.summed(slopes.data, weights) - barrier / below + barrier / above)
+        right_p = -(
             problem.values(state.x)[1:]
             - state.y
-            + barrier / state.price
-            + state.y * (WEIGHT - state.price) / state.floor
-            - barrier / state.floor
+            + barrier / state.multiplier
+            + state.y * (WEIGHT - state.multiplier) / state.y_multiplier
+            - barrier / state.y_multiplier
         )
-        dx, price = _saddle(diagonal, slopes[1:], give, push, pull)
-        floor = WEIGHT - state.price - price - state.floor
+        dx, multiplier = _saddle(diagonal, slopes[1:], compliance, right_x, right_p)
+        y_multiplier = WEIGHT - state.multiplier - multiplier - state.y_multiplier
         return _State(
             x=dx,
-            y=barrier / state.floor - state.y - state.y * floor / state.floor,
-            slack=barrier / state.price - state.slack - state.slack * price / state.price,
-            price=price,
-            floor=floor,
-            left=barrier / below - state.left - state.left * dx / below,
-            right=barrier / above - state.right + state.right * dx / above,
+            y=barrier / state.y_multiplier - state.y - state.y * y_multiplier / state.y_multiplier,
+            slack=barrier / state.multiplier
+            - state.slack
+            - state.slack * multiplier / state.multiplier,
+            multiplier=multiplier,
+            y_multiplier=y_multiplier,
+            low_multiplier=barrier / below
+            - state.low_multiplier
+            - state.low_multiplier * dx / below,
+            high_multiplier=barrier / above
+            - state.high_multiplier
+            + state.high_multiplier * dx / above,
         )
 
-    def _room(self, state: _State, step: _State) -> float:
+    def _longest_step(self, state: _State, step: _State) -> float:
         """Finds the longest step, at most 1, that keeps everything positive by a margin."""
         pairs = [
             (getattr(state, name), getattr(step, name))
-            for name in ("y", "slack", "price", "floor", "left", "right")
+            for name in (
+                "y",
+                "slack",
+                "multiplier",
+                "y_multiplier",
+                "low_multiplier",
+                "high_multiplier",
+            )
         ]
         pairs += [(state.x - self.problem.low, step.x), (self.problem.high - state.x, -step.x)]
-        closing = max(float(np.max(-change / value, initial=0.0)) for value, change in pairs)
-        return 1.0 / max(1.0, 1.01 * closing)
+        ratio = max(float(np.max(-change / value, initial=0.0)) for value, change in pairs)
+        return 1.0 / max(1.0, 1.01 * ratio)
 
 
 def _saddle(
-    diagonal: Floats, matrix: sp.csr_array, give: Floats, push: Floats, pull: Floats
+    diagonal: Floats, matrix: sp.csr_array, compliance: Floats, right_x: Floats, right_p: Floats
 ) -> tuple[Floats, Floats]:
     """Solves diagonal dx + matrix^T dp = push and matrix dx - give dp = pull."""
     if matrix.shape[0] < matrix.shape[1]:
         scaled = _with_entries(matrix, matrix.data * (1 / diagonal)[matrix.indices])
-        schur = (scaled @ matrix.T).toarray() + np.diag(give)
-        dp = cho_solve(cho_factor(schur), scaled @ push - pull)
-        return (push - matrix.T @ dp) / diagonal, dp
-    each = np.repeat(1 / give, np.diff(matrix.indptr))
+        schur = (scaled @ matrix.T).toarray() + np.diag(compliance)
+        dp = cho_solve(cho_factor(schur), scaled @ right_x - right_p)
+        return (right_x - matrix.T @ dp) / diagonal, dp
+    each = np.repeat(1 / compliance, np.diff(matrix.indptr))
     scaled = _with_entries(matrix, matrix.data * each)
     schur = (matrix.T @ scaled).toarray() + np.diag(diagonal)
-    dx = cho_solve(cho_factor(schur), push + scaled.T @ pull)
-    return dx, (matrix @ dx - pull) / give
+    dx = cho_solve(cho_factor(schur), right_x + scaled.T @ right_p)
+    return dx, (matrix @ dx - right_p) / compliance

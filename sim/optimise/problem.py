@@ -25,7 +25,7 @@ Callback = Callable[["Evaluation"], None]
 CONFIRMED = 1e-6
 """Relative difference up to which a loss counts as found again."""
 
-FLATTEST = 1e-6
+LEAST_SLOPE = 1e-6
 """Largest slope of a loss, at the start, that absolute tolerances of 1e-10 still suit."""
 
 log = logging.getLogger(__name__)
@@ -131,14 +131,14 @@ class CountedProblem:
         return "evaluations used up" if len(self.evaluations) >= self.budget else None
 
     @property
-    def left(self) -> int:
+    def remaining(self) -> int:
         """Counts the evaluations that may follow."""
         return 0 if self.finished else self.budget - len(self.evaluations)
 
     @property
     def unit(self) -> float:
         """Returns the unit of the loss for absolute tolerances: 1, or less for one that is tiny."""
-        return min(1.0, (self.steepest or 1.0) / FLATTEST)
+        return min(1.0, (self.steepest or 1.0) / LEAST_SLOPE)
 
     def place(self, x: Floats) -> ConstraintPoint:
         """Evaluates the constraints."""

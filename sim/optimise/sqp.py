@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim.core import Floats, Ints, SimulationError
-from sim.optimise.feasibility import feasible_start, project, retreat
+from sim.optimise.feasibility import feasible_start, interior_design, project
 from sim.optimise.problem import ConstraintPoint, CountedProblem, EvaluatedPoint, Result
 from sim.optimise.qp import dense_step, reachable
 from sim.optimise.quasi_newton import QuasiNewton
@@ -18,13 +18,13 @@ from sim.optimise.quasi_newton import QuasiNewton
 ACCEPT, SHRINK, GROW = 1e-4, 0.25, 0.75
 """Ratios of actual to predicted reduction: to accept a step, to shrink and to grow the radius."""
 
-RETREAT_COST = 3
-"""A retreat is worth its while if it can take this many times the patience."""
+RESTART_COST = 3
+"""A restart is made if it can take this many times the patience."""
 
-CALM = 0.9
+CAUTION_DECAY = 0.9
 """Factor of the caution from one evaluation to the next."""
 
-JUMP = 0.5
+UNEXPLAINED_SHARE = 0.5
 """Share of a change of the loss that the slopes at both ends may leave unexplained."""
 
 
@@ -88,9 +88,9 @@ def sqp(problem: CountedProblem, x0: Floats, options: SqpOptions) -> Result:
     reason = Descent(problem, point, options).run()
     random = np.random.default_rng(options.seed)
     for _ in range(options.retreats):
-        if problem.left < RETREAT_COST * options.patience:
+        if problem.remaining < RESTART_COST * options.patience:
             break
-        inside = _retreat(problem, options, random)
+        inside = _restart_from_interior(problem, options, random)
         if inside is not None:
             reason = Descent(problem, inside, options).run()
     if problem.finished is None and options.retreats:
@@ -105,13 +105,13 @@ def _polish(problem: CountedProblem, options: SqpOptions) -> str:
     return Descent(problem, problem.best, last).run()
 
 
-def _retreat(
+def _restart_from_interior(
     problem: CountedProblem, options: SqpOptions, random: np.random.Generator
 ) -> EvaluatedPoint | None:
-    """Simulates a design well inside the constraints, near a kicked copy of the best one."""
+    """Simulates a design in the interior of the feasible set, near the best one kicked."""
     assert problem.best is not None
     shift = random.uniform(-options.kick, options.kick, problem.best.x.shape)
-    place = retreat(problem, problem.best.x + shift, options.depth, options.radius_max)
+    place = interior_design(problem, problem.best.x + shift, options.depth, options.radius_max)
     if place is None:
         return None
     outcome = problem.simulate(place)
@@ -120,7 +120,7 @@ def _retreat(
 
 
 class Descent:
-    """Steps downhill from one design until nothing more is gained."""
+    """Descends from one design by trust-region steps until it stalls."""
 
     def __init__(self, problem: CountedProblem, point: EvaluatedPoint, options: SqpOptions) -> None:
         self.problem = problem
@@ -162,7 +162,7 @@ class Descent:
             self.radius /= 4
             accepted = False
         else:
-            accepted = self._judge(trial, outcome)
+            accepted = self._update_trust_region(trial, outcome)
         if accepted:
             self.residual = self.problem.stationarity(self.point).residual
         self.steps += 1
@@ -172,7 +172,7 @@ class Descent:
     def _propose(self) -> SqpTrial | None:
         """Proposes the model's best step within the radius, made feasible; None if none is."""
         point, radius = self.point, self.radius
-        spendable = (1 - self._kept()) * point.values
+        spendable = (1 - self._margin_share()) * point.values
         rows = reachable(spendable, point.jacobian, radius)
         found = dense_step(
             self.model.matrix,
@@ -192,22 +192,22 @@ class Descent:
         predicted = self.model.reduction(point.gradient, found.step)
         return SqpTrial(place, predicted, rows, found.multipliers) if predicted > 0 else None
 
-    def _kept(self) -> float:
+    def _margin_share(self) -> float:
         """Returns the share of every margin that the next step must leave.
 
         Constraints that become active early steer the descent into poor optima.
         """
-        return self.options.caution * CALM**self.steps
+        return self.options.caution * CAUTION_DECAY**self.steps
 
-    def _judge(self, trial: SqpTrial, outcome: EvaluatedPoint) -> bool:
-        """Learns from a simulated step, adapts the radius, and moves if the loss decreased."""
+    def _update_trust_region(self, trial: SqpTrial, outcome: EvaluatedPoint) -> bool:
+        """Updates model and radius by a simulated step, and accepts it if the loss decreased."""
         step = outcome.x - self.point.x
         ratio = (self.point.loss - outcome.loss) / trial.predicted
-        if self._jumped(step, outcome, trial.predicted):
+        if self._changed_branch(step, outcome, trial.predicted):
             self.radius /= 4
             return self._move(outcome, ratio)
-        bend = outcome.jacobian[trial.rows] - self.point.jacobian[trial.rows]
-        change = outcome.gradient - self.point.gradient - bend.T @ trial.multipliers
+        jacobian_change = outcome.jacobian[trial.rows] - self.point.jacobian[trial.rows]
+        change = outcome.gradient - self.point.gradient - jacobian_change.T @ trial.multipliers
         self.model.update(step, change)
         length = float(np.abs(step).max())
         if ratio < SHRINK:
@@ -216,7 +216,7 @@ class Descent:
             self.radius = min(2 * self.radius, self.options.radius_max)
         return self._move(outcome, ratio)
 
-    def _jumped(self, step: Floats, outcome: EvaluatedPoint, predicted: float) -> bool:
+    def _changed_branch(self, step: Floats, outcome: EvaluatedPoint, predicted: float) -> bool:
         """Detects a loss of another branch of solutions, which tells nothing of this one.
 
         Along one branch the trapezoidal rule recovers the change of the loss from its slopes.
@@ -224,7 +224,9 @@ class Descent:
         change = outcome.loss - self.point.loss
         explained = float((self.point.gradient + outcome.gradient) @ step) / 2
         unexplained = abs(change - explained)
-        return unexplained > predicted and unexplained > JUMP * max(abs(change), abs(explained))
+        return unexplained > predicted and unexplained > UNEXPLAINED_SHARE * max(
+            abs(change), abs(explained)
+        )
 
     def _move(self, outcome: EvaluatedPoint, ratio: float) -> bool:
         if ratio <= ACCEPT:

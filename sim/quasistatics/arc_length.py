@@ -22,7 +22,7 @@ from sim.core import Floats
 from sim.energy import System, Topology, gradient, hessian_product, locate, system_of, workspace
 from sim.solvers import PrescribedMotion, SelectedMotion
 from sim.structure import ConcreteParameters
-from sim.vibration import WholeTangent
+from sim.vibration import FullTangent
 
 FIRST_LENGTH, LONGEST, SHORTEST = 0.05, 2.0, 1e-6
 """Arc length of a step, in mm of the root of the summed squares of all dofs."""
@@ -30,9 +30,9 @@ TRAPEZOIDAL_ERROR = 0.05
 """Departure of a step from the trapezoidal rule at most, over its length."""
 CORRECTIONS, FAST = 12, 6
 """Newton steps of a point at most, and those up to which the next step is longer."""
-BALANCED = 1e-9
+CONVERGED = 1e-9
 """Newton step at which a point counts as found, mm."""
-SLOW = 0.2
+SLOW_RATE = 0.2
 """Share of the last Newton step above which the next is made by the tangent there."""
 FEW = 20
 """Degrees of freedom below which all eigenvalues are computed."""
@@ -62,33 +62,33 @@ class Tangent:
         self._factor = spla.splu(
             stiffness, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
         )
-        self.falling = int((self._factor.U.diagonal() < 0.0).sum())
-        self._across = self._factor.solve(load)
+        self.n_negative = int((self._factor.U.diagonal() < 0.0).sum())
+        self._load_response = self._factor.solve(load)
 
     def solve(self, right: Floats, ahead: Floats) -> Floats:
         """Solves [K f; t] y = right (n_free + 1,), t the direction ahead."""
         # y = y1 - a K^-1 f with K y1 = r and t . y + t_a a = r_a
         free = self._factor.solve(right[:-1])
-        way = (right[-1] - ahead[:-1] @ free) / (ahead[-1] - ahead[:-1] @ self._across)
-        return np.append(free - way * self._across, way)
+        load_step = (right[-1] - ahead[:-1] @ free) / (ahead[-1] - ahead[:-1] @ self._load_response)
+        return np.append(free - load_step * self._load_response, load_step)
 
     def solve_transposed(self, right: Floats, ahead: Floats) -> Floats:
         """Solves [K t; f] y = right (n_free + 1,)."""
         free, along = self._factor.solve(right[:-1]), self._factor.solve(ahead[:-1])
-        way = (right[-1] - self._load @ free) / (ahead[-1] - self._load @ along)
-        return np.append(free - way * along, way)
+        load_step = (right[-1] - self._load @ free) / (ahead[-1] - self._load @ along)
+        return np.append(free - load_step * along, load_step)
 
     def lowest(self, count: int) -> tuple[Floats, Floats]:
         """Finds the smallest eigenvalue, or so many negative ones, from zero down; and modes."""
         if self.size < FEW:
             values, modes = np.linalg.eigh(self._stiffness.toarray())
-            first = max(self.falling - count, 0)
+            first = max(self.n_negative - count, 0)
             return values[first : first + count], modes[:, first : first + count]
         inverse = spla.LinearOperator(
             (self.size, self.size), matvec=self._factor.solve, dtype=float
         )
         start = np.sin(1.0 + np.arange(self.size))
-        found, modes = spla.eigsh(inverse, count, which="SA" if self.falling else "LA", v0=start)
+        found, modes = spla.eigsh(inverse, count, which="SA" if self.n_negative else "LA", v0=start)
         return 1.0 / found, modes
 
 
@@ -106,7 +106,7 @@ class ArcLengthPath:
     ) -> None:
         self.system: System = system_of(topology, values)
         self._work = workspace(self.system)
-        self._tangent = WholeTangent(topology, values)
+        self._tangent = FullTangent(topology, values)
         self._n_moving = 3 * topology.n_units
         self._last: tuple[PathPoint, Tangent] | None = None
         self._held, self.free = topology.held, np.sort(topology.free_dofs)
@@ -162,17 +162,17 @@ class ArcLengthPath:
 
         The tangent ``near``, by default that at the beginning, serves as long as it leads on well.
         """
-        pace, step, before = self._pace(begin.load), length * ahead, float(np.inf)
+        load_scale, step, before = self._load_scale(begin.load), length * ahead, float(np.inf)
         tangent = near or self.tangent_at(begin)
         for number in range(CORRECTIONS):
             state = begin.state.copy()
             state[self.free] += step[:-1] / self.scale
-            point = self.point(begin.load + step[-1] / pace, state)
+            point = self.point(begin.load + step[-1] / load_scale, state)
             residual = np.append(self._force(point), ahead @ step - length)
             if tangent is None or not np.isfinite(residual).all():
                 return None, False
             change = tangent.solve(-residual, ahead)
-            if np.linalg.norm(change) > SLOW * before:
+            if np.linalg.norm(change) > SLOW_RATE * before:
                 tangent = self.tangent_at(point)
                 if tangent is None:
                     return None, False
@@ -181,7 +181,7 @@ class ArcLengthPath:
             if not before <= 2.0 * length:
                 return None, False
             step += change
-            if before < BALANCED:
+            if before < CONVERGED:
                 return point, number < FAST
         return None, False
 
@@ -194,9 +194,9 @@ class ArcLengthPath:
         return found / np.linalg.norm(found)
 
     def step(self, begin: PathPoint, after: PathPoint) -> Floats:
-        """Returns the scaled way (n_free + 1,) between two points, mm."""
+        """Computes the scaled step (n_free + 1,) between two points, mm."""
         moved = (after.state - begin.state)[self.free] * self.scale
-        return np.append(moved, (after.load - begin.load) * self._pace(begin.load))
+        return np.append(moved, (after.load - begin.load) * self._load_scale(begin.load))
 
     def trapezoidal_error(self, begin: PathPoint, after: PathPoint, mean: Floats) -> float:
         """Measures the departure of a step from the trapezoidal rule, over its length.
@@ -229,14 +229,14 @@ class ArcLengthPath:
         tangent = self.tangent_at(point)
         if tangent is None:
             return 0.0, 0
-        return float(tangent.lowest(1)[0][0]), tangent.falling
+        return float(tangent.lowest(1)[0][0]), tangent.n_negative
 
     def tangent_at(self, point: PathPoint) -> Tangent | None:
         """Factorises the tangent at a point; None if it is singular."""
         if self._last is None or self._last[0] is not point:
-            way, along = self.way(point), np.empty_like(point.state)
+            held_rate, along = self.held_rate(point), np.empty_like(point.state)
             locate(point.state, self.system, self._work.kinematics)
-            hessian_product(point.state, self.system, self._work.kinematics, way, along)
+            hessian_product(point.state, self.system, self._work.kinematics, held_rate, along)
             try:
                 found = Tangent(self.stiffness(point), along[self.free] / self.scale)
             except RuntimeError:
@@ -244,14 +244,14 @@ class ArcLengthPath:
             self._last = point, found
         return self._last[1]
 
-    def way(self, point: PathPoint) -> Floats:
-        """Returns the motion (n_dofs,) of the held dofs by a mm of their way."""
+    def held_rate(self, point: PathPoint) -> Floats:
+        """Computes the unit direction (n_dofs,) in which the drive moves the held dofs."""
         found = np.zeros_like(point.state)
-        found[self._held], pace = self._rates(point.load)
-        return found / pace
+        found[self._held], load_scale = self._rates(point.load)
+        return found / load_scale
 
-    def _pace(self, load: float) -> float:
-        """Returns the way of the held dofs over the load parameter, mm."""
+    def _load_scale(self, load: float) -> float:
+        """Computes the speed of the held dofs by the load parameter, mm."""
         return self._rates(load)[1]
 
     def _force(self, point: PathPoint) -> Floats:
@@ -260,7 +260,7 @@ class ArcLengthPath:
 
     def stiffness(self, point: PathPoint) -> sp.csc_array:
         """Assembles the scaled tangent (n_free, n_free)."""
-        found = self._tangent.among(self.free, self.free, point.state[: self._n_moving])
+        found = self._tangent.submatrix(self.free, self.free, point.state[: self._n_moving])
         weights = 1.0 / self.scale
         found.data *= weights[found.indices] * np.repeat(weights, np.diff(found.indptr))
         return found

@@ -13,7 +13,7 @@ from sim.quasistatics.static_solver import StaticRecord, StaticSolver
 from sim.solvers import PrescribedMotion
 from sim.structure import ConcreteParameters
 
-PAST = 1e-6
+OVERSHOOT = 1e-6
 """Share of its load by which a path may pass the snap that it turns at."""
 
 
@@ -25,7 +25,7 @@ class EquilibriumTrace(NamedTuple):
     # (n_points,) smallest one of the tangent, with rotations times the scale, N/mm; of several
     # negative ones that nearest to zero
     eigenvalue: Floats
-    falling: Ints  # (n_points,) number of negative eigenvalues
+    n_negative: Ints  # (n_points,) number of negative eigenvalues
 
     @property
     def turns(self) -> Ints:
@@ -73,11 +73,11 @@ def trace_first_snap(
     before = (float(loads[number - 1]), record.states[number - 1]) if number else rest
     limit_point = record.jumped[number] != BRANCHING
     near = record.snaps[record.snaps <= loads[number]]
-    end = float(near[-1] * (1.0 + PAST) if limit_point else loads[-1])
+    end = float(near[-1] * (1.0 + OVERSHOOT) if limit_point else loads[-1])
     found = trace(top, values, drive, before, end)
     kept = found.loads <= end
     return EquilibriumTrace(
-        found.loads[kept], found.states[kept], found.eigenvalue[kept], found.falling[kept]
+        found.loads[kept], found.states[kept], found.eigenvalue[kept], found.n_negative[kept]
     )
 
 
@@ -87,11 +87,11 @@ def _trace(
 ) -> EquilibriumTrace:  # fmt: skip
     path = ArcLengthPath(topology, values, drive)
     found = list(path.points(start, end, points, longest))
-    eigenvalue, falling = zip(*map(path.stability, found), strict=True)
+    eigenvalue, n_negative = zip(*map(path.stability, found), strict=True)
     raise_new_pairs(path.system.contacts)
     return EquilibriumTrace(
         np.array([one.load for one in found]),
         np.stack([one.state for one in found]),
         np.array(eigenvalue),
-        np.array(falling),
+        np.array(n_negative),
     )

@@ -26,7 +26,7 @@ from sim.structure import ConcreteParameters
 
 POINTS = 150
 """Points of a path at most."""
-RECOVERED = 0.5
+RECOVERY = 0.5
 """Share of the smallest eigenvalue of a fold by which the next points show that it was passed."""
 BRACKET = 1e-3
 """Share of the way between two neighbours of the softest point that its bracket is wide."""
@@ -40,7 +40,7 @@ class SoftestPoint(NamedTuple):
     slopes: ConcreteParameters  # derivatives of the eigenvalue
 
 
-class _Soft(NamedTuple):
+class _LowestMode(NamedTuple):
     eigenvalue: float
     mode: Floats  # (n_free,) S v
     point: PathPoint
@@ -64,21 +64,21 @@ def softest_point(
         SimulationError: the tangent is exactly singular there.
     """
     try:
-        return _softest(topology, values, drive, start, end)
+        return _find_softest(topology, values, drive, start, end)
     except NewContactPairs as met:
         return softest_point(topology.coupling(met.pairs), values, drive, start, end)
 
 
-def _softest(
+def _find_softest(
     topology: Topology, values: ConcreteParameters, drive: PrescribedMotion,
     start: tuple[float, Floats], end: float,
 ) -> SoftestPoint | None:  # fmt: skip
     path = ArcLengthPath(topology, values, drive)
-    found: list[_Soft] = []
+    found: list[_LowestMode] = []
     for point in path.points(start, end, POINTS, turns=False):
-        found.append(_soft(path, point))
+        found.append(_lowest_mode(path, point))
         lowest = min(each.eigenvalue for each in found)
-        if lowest < 0.0 and found[-1].eigenvalue > RECOVERED * lowest:
+        if lowest < 0.0 and found[-1].eigenvalue > RECOVERY * lowest:
             break
     raise_new_pairs(path.system.contacts)
     softest = int(np.argmin([each.eigenvalue for each in found]))
@@ -89,9 +89,9 @@ def _softest(
     span = float(ahead @ path.step(before, after))
     near = path.tangent_at(before)
 
-    def at(length: float) -> _Soft:
+    def at(length: float) -> _LowestMode:
         point, _ = path.correct(before, ahead, length, near)
-        return found[softest] if point is None else _soft(path, point)
+        return found[softest] if point is None else _lowest_mode(path, point)
 
     best = minimize_scalar(
         lambda length: at(length).eigenvalue, bounds=(0.0, span), method="bounded",
@@ -110,27 +110,27 @@ def _softest(
     return SoftestPoint(middle.point.load, middle.eigenvalue, slopes)
 
 
-def _soft(path: ArcLengthPath, point: PathPoint) -> _Soft:
+def _lowest_mode(path: ArcLengthPath, point: PathPoint) -> _LowestMode:
     """Finds the smallest eigenvalue at a point, and its mode."""
     tangent = path.tangent_at(point)
     if tangent is None:
         values, modes = np.linalg.eigh(path.stiffness(point).toarray())
     else:
-        values, modes = tangent.lowest(max(tangent.falling, 1))
+        values, modes = tangent.lowest(max(tangent.n_negative, 1))
     lowest = int(values.argmin())
-    return _Soft(float(values[lowest]), modes[:, lowest], point)
+    return _LowestMode(float(values[lowest]), modes[:, lowest], point)
 
 
 def _slopes(
-    path: ArcLengthPath, topology: Topology, soft: _Soft, ahead: Floats
+    path: ArcLengthPath, topology: Topology, soft: _LowestMode, ahead: Floats
 ) -> ConcreteParameters:
     """Differentiates an eigenvalue while the state changes across the way ``ahead`` alone."""
     system, state, free = path.system, soft.point.state, path.free
     mode = np.zeros_like(state)
     mode[free] = soft.mode / path.scale
     bars, bar = mode_slopes(topology, system, state, mode)
-    way = path.way(soft.point)
-    right = np.append(bar[free] / path.scale, bar @ way)
+    held_rate = path.held_rate(soft.point)
+    right = np.append(bar[free] / path.scale, bar @ held_rate)
     tangent = path.tangent_at(soft.point)
     if tangent is None:
         raise SimulationError("the tangent is singular at the softest point of a path")

@@ -89,29 +89,31 @@ class StaticSolver:
         top = self.topology
         system = system_of(top, values)
         check_start(top, values, system.contacts, np.zeros(top.n_dofs))
-        reached, fraction = self._follow(values, loads, 0, progress, top, system, branch, counts)
+        reached, fraction = self._follow_path(
+            values, loads, 0, progress, top, system, branch, counts
+        )
         while self.continues and len(met := new_pairs(system.contacts)) > 0:
             top = top.coupling(met)
             system = system_of(top, values)
-            _forget(branch, reached)
-            reached, fraction = self._follow(
+            _clear(branch, reached)
+            reached, fraction = self._follow_path(
                 values, loads, reached, progress, top, system, branch, counts
             )
         raise_new_pairs(system.contacts)
         if reached < len(loads):
             if self.leaves or not branch.jumped[reached]:
-                raise self._ended(values, branch.states[: reached + 1], fraction, last)
+                raise self._no_equilibrium(values, branch.states[: reached + 1], fraction, last)
             branch.states[reached:] = np.nan
         check_ligaments(top, values, branch.states[:reached])
         record = _record(branch, counts, top, passed, last)
         return record.states.copy(), np.zeros_like(record.states), record
 
-    def _follow(
+    def _follow_path(
         self, values: ConcreteParameters, loads: Floats, known: int, progress: Floats,
         top: Topology, system: System, branch: Branch, counts: Ints,
     ) -> tuple[int, float]:  # fmt: skip
         """Follows the path on from its first `known` loads; see ``follow``."""
-        bends, trusted = self._known(branch.states)
+        bends, trusted = self._path_curvature(branch.states)
         rounding = ROUNDING + ROUNDING_OF_MOTION * np.abs(loads * top.scale[top.held]).max(
             initial=0
         )
@@ -122,7 +124,7 @@ class StaticSolver:
             workspace(system, self.threads), self.relative, floor, drag, branch, counts,
         )  # fmt: skip
 
-    def _ended(
+    def _no_equilibrium(
         self, values: ConcreteParameters, states: Floats, fraction: float, last: Ints
     ) -> SimulationError:
         """Explains that no equilibrium was found beyond the last of the states.
@@ -163,7 +165,7 @@ class StaticSolver:
             last.append(len(stops) * self.substeps - 1)
         return replace(self, output_times=np.array(stops)).passed, np.array(last, dtype=np.int64)
 
-    def _known(self, states: Floats) -> tuple[Floats, Ints]:
+    def _path_curvature(self, states: Floats) -> tuple[Floats, Ints]:
         """Computes the departure of the start's path from its tangents, and where it may serve."""
         start = self.start
         if start is None or start.states.shape != states.shape:
@@ -200,7 +202,7 @@ def _empty_branch(n_loads: int, n_dofs: int) -> Branch:
     )
 
 
-def _forget(branch: Branch, known: int) -> None:
+def _clear(branch: Branch, known: int) -> None:
     """Clears what a branch holds beyond its first `known` loads but states."""
     branch.jumped[known:] = 0
     branch.snapped[known:] = np.nan
@@ -210,7 +212,7 @@ def _forget(branch: Branch, known: int) -> None:
 def _record(
     branch: Branch, counts: Ints, topology: Topology, passed: Floats, last: Ints
 ) -> StaticRecord:
-    """Keeps the output loads, numbered in `last` (n_times,), of all that were passed."""
+    """Records the output loads, numbered in `last` (n_times,), of all that were passed."""
     before, first = np.concatenate([[0.0], passed[:-1]]), np.append(0, last[:-1] + 1)
     snapped = before + branch.snapped * (passed - before)
     places = branch.snaps[np.isfinite(branch.snaps)]
@@ -219,7 +221,7 @@ def _record(
         branch.states[last].copy(),
         branch.tangents[last].copy(),
         branch.stable[last].copy(),
-        _first_kinds(branch.jumped, last),
+        _first_jumps(branch.jumped, last),
         np.fmax.reduceat(snapped, first),
         branch.eigenvalue[last].copy(),
         counts,
@@ -228,7 +230,7 @@ def _record(
     )
 
 
-def _first_kinds(jumped: Ints, last: Ints) -> Ints:
-    """Takes of the loads up to each output one the first kind that is no smooth way, or 0."""
+def _first_jumps(jumped: Ints, last: Ints) -> Ints:
+    """Selects the first kind of jump among the loads up to each output one, or 0."""
     ways = np.split(jumped, last[:-1] + 1)
     return np.array([way[(way > 0).argmax()] for way in ways], dtype=np.int64)

@@ -48,7 +48,7 @@ def equal_cases(scene: Scene, vertices: Floats, values: ConcreteParameters) -> I
         return every
     sets = (clamped, loads.driven, scene.objective.region)
     kept = all(np.array_equal(np.sort(image.unit[one]), np.sort(one)) for one in sets)
-    if not (kept and _keeps_constants(image, values)):
+    if not (kept and _have_same_constants(image, values)):
         return every
     first = every.copy()
     for case in every:
@@ -76,14 +76,14 @@ def quarter_turn(lattice: Lattice, vertices: Floats) -> NetworkImage | None:
     if unit is None or vertex is None or (lattice.unit[vertex] != unit[lattice.unit]).any():
         return None
     ends = vertex[lattice.ligaments]
-    ligament = _places(np.sort(ends, axis=1), np.sort(lattice.ligaments, axis=1))
+    ligament = _match_rows(np.sort(ends, axis=1), np.sort(lattice.ligaments, axis=1))
     if ligament is None:
         return None
     same_way = (ends == lattice.ligaments[ligament]).all(axis=1)
     return NetworkImage(unit, ligament, np.where(same_way, 1, -1))
 
 
-def _places(rows: Ints, among: Ints) -> Ints | None:
+def _match_rows(rows: Ints, among: Ints) -> Ints | None:
     """Finds the place (n,) of each row (n, 2) among others, each once; None if they differ."""
     order, wanted = np.lexsort(among.T), np.lexsort(rows.T)
     if len(np.unique(among, axis=0)) < len(among) or (among[order] != rows[wanted]).any():
@@ -93,7 +93,7 @@ def _places(rows: Ints, among: Ints) -> Ints | None:
     return place
 
 
-def _keeps_constants(image: NetworkImage, values: ConcreteParameters) -> bool:
+def _have_same_constants(image: NetworkImage, values: ConcreteParameters) -> bool:
     """Checks that what a turn takes to one another has the same constants."""
     turned = values.vector @ QUARTER_TURN.T * image.reversed[:, None]
     pairs = (

@@ -23,23 +23,30 @@ from sim.scene.path_constraints import PathConstraints, check_unsnapped
 from sim.scene.plan import Plan, make_plan, sample_times
 from sim.scene.scene import Scene
 from sim.scene.simulation import mimicking
-from sim.scene.time_solver import RULES, twice_as_fine
+from sim.scene.time_solver import RULES, with_halved_steps
 from sim.scene.warm_starts import Paths
-from sim.solvers import PrescribedMotion, Solver, adjoint_cases, concrete, everywhere, solve_cases
+from sim.solvers import (
+    PrescribedMotion,
+    Solver,
+    adjoint_cases,
+    concrete,
+    solve_cases,
+    with_full_adjoint,
+)
 from sim.structure import Parameters
 
 LOG = logging.getLogger(__name__)
 
 
 class Memory(Protocol):
-    """Remembers the equilibrium paths of designs, to start similar ones from."""
+    """Stores the equilibrium paths of designs, to warm-start similar ones."""
 
     def start(self) -> Sequence[StaticRecord] | None:
         """Records (n_cases,) to start the next evaluation from, if any."""
         ...
 
     def keep(self, design: Floats, records: Sequence[StaticRecord]) -> None:
-        """Takes the records of an evaluation."""
+        """Stores the records of an evaluation."""
         ...
 
 
@@ -63,7 +70,7 @@ class GradientChain:
         self.of_design = of_design
         self._measured = jax.jit(jax.value_and_grad(measure, argnums=(0, 1), has_aux=True))
 
-    def mapped(self, of_design: ParameterMap) -> Self:
+    def with_map(self, of_design: ParameterMap) -> Self:
         """Returns the chain behind another map, its measure compiled no second time."""
         other = copy(self)
         other.of_design = of_design
@@ -83,9 +90,9 @@ class GradientChain:
             SimulationError: a step failed, or an equilibrium is not stable.
         """
         made = self.of_design(design)
-        solver = solver if self._designed else everywhere(solver)
+        solver = solver if self._designed else with_full_adjoint(solver)
         motion, velocity, records = solve_cases(
-            solver, concrete(made), cases, _started(solver, memory)
+            solver, concrete(made), cases, _warm_started(solver, memory)
         )
         if memory is not None and isinstance(solver, StaticSolver):
             memory.keep(design, records.records)
@@ -98,12 +105,12 @@ class GradientChain:
 
 
 def _slopes(computed: Array) -> Floats:
-    """Takes no slope for zero: a root has none where what it measures vanishes."""
+    """Replaces slopes that are not finite by zero: a root has none at zero."""
     slopes = np.asarray(computed)
     return np.where(np.isnan(slopes), 0.0, slopes)
 
 
-def _started(solver: Solver, memory: Memory | None) -> list[Solver] | None:
+def _warm_started(solver: Solver, memory: Memory | None) -> list[Solver] | None:
     if memory is None or not isinstance(solver, StaticSolver):
         return None
     records = memory.start()
@@ -144,7 +151,7 @@ class Evaluator:
         self._cases = tuple(scene.loads.cases[case] for case in simulated)
         self._memory = memory
         chain = GradientChain(parameters_of_design(scene), mean, designed=True)
-        self._chains = [chain.mapped(each) for each in parameters_of_copies(scene)]
+        self._chains = [chain.with_map(each) for each in parameters_of_copies(scene)]
 
     def __call__(self, design: Floats) -> tuple[float, Floats, Floats]:
         """Computes loss, gradient (n_variables,) in 1/mm and losses (n_cases,) of a design, mm.
@@ -157,10 +164,10 @@ class Evaluator:
             return self._chains[0](design, solver=solver, cases=cases, memory=self._memory)
         memory = None
         if self._memory is not None and isinstance(solver, StaticSolver):
-            memory = _PartedMemory(self._memory, len(cases))
+            memory = _CopyMemory(self._memory, len(cases))
         found = [chain(design, solver=solver, cases=cases, memory=memory) for chain in self._chains]
         if memory is not None:
-            memory.close(design)
+            memory.finish(design)
         values, gradients, each = (np.array(part) for part in zip(*found, strict=True))
         # (sum v^p / n)^(1/p) of the copies' losses v, and its derivatives (v / value)^(p - 1) / n
         sharpness = self.scene.objective.copy_sharpness
@@ -169,12 +176,12 @@ class Evaluator:
         return value, shares @ gradients, each.mean(axis=0)
 
 
-class _PartedMemory:
-    """Remembers the paths of all copies of a design together (``Memory``), one after the other."""
+class _CopyMemory:
+    """Splits the stored paths of a design by its copies (``Memory``), one after the other."""
 
-    def __init__(self, whole: Memory, n_cases: int) -> None:
-        self._whole, self._n_cases = whole, n_cases
-        self._before, self._after = whole.start(), list[StaticRecord]()
+    def __init__(self, every_copy: Memory, n_cases: int) -> None:
+        self._every_copy, self._n_cases = every_copy, n_cases
+        self._before, self._after = every_copy.start(), list[StaticRecord]()
 
     def start(self) -> Sequence[StaticRecord] | None:
         """See ``Memory``."""
@@ -186,9 +193,9 @@ class _PartedMemory:
         del design
         self._after += records
 
-    def close(self, design: Floats) -> None:
-        """Hands on the records of all copies."""
-        self._whole.keep(design, self._after)
+    def finish(self, design: Floats) -> None:
+        """Stores the records of all copies."""
+        self._every_copy.keep(design, self._after)
 
 
 _evaluator = lru_cache(maxsize=4)(Evaluator)
@@ -255,7 +262,7 @@ def minimise(
     constraints = constraints_of(scene, made, limits, journal)
     begin = np.zeros(scene.space.n_variables) if start is None else start
     if isinstance(constraints, PathConstraints):
-        begin = constraints.drawn_back(begin)
+        begin = constraints.recover_start(begin)
 
     def record(evaluation: Evaluation) -> None:
         if paths is not None:
@@ -270,13 +277,13 @@ def minimise(
         begin,
         options=options,
         callback=record,
-        confirm=_from_rest(scene, made),
+        confirm=_confirmation(scene, made),
     )
-    _check_steps(computed, result)
+    _check_time_steps(computed, result)
     return result
 
 
-def _check_steps(evaluate: Evaluator, result: Result) -> None:
+def _check_time_steps(evaluate: Evaluator, result: Result) -> None:
     """Warns if the loss at the start or the end changes with half the steps by more than allowed.
 
     The steps were chosen for the initial structure and kept. What is allowed is that share of the
@@ -287,7 +294,7 @@ def _check_steps(evaluate: Evaluator, result: Result) -> None:
         return
     first = result.evaluations[0]
     finer = copy(evaluate)
-    finer.plan = replace(evaluate.plan, solver=twice_as_fine(solver))
+    finer.plan = replace(evaluate.plan, solver=with_halved_steps(solver))
     allowed = RULES[evaluate.scene.numerics.accuracy].loss
     for name, design, loss in (("start", first.x, first.loss), ("end", result.x, result.loss)):
         try:
@@ -309,13 +316,13 @@ def _check_steps(evaluate: Evaluator, result: Result) -> None:
 def constraints_of(
     scene: Scene, plan: Plan, limits: Limits, journal: Journal | None = None
 ) -> ConstraintVector | PathConstraints:
-    """Lists what a design must keep to; a journal remembers what that takes to solve."""
+    """Makes the constraints of a design; a journal holds those under loads."""
     geometry, asked = ConstraintVector(scene.space, limits), scene.objective
     at_rest = asked.snap_margin is None and asked.foil is None
     return geometry if at_rest else PathConstraints(scene, plan, geometry, journal)
 
 
-def _from_rest(scene: Scene, plan: Plan) -> Evaluator | None:
+def _confirmation(scene: Scene, plan: Plan) -> Evaluator | None:
     """Evaluates by a path followed anew, over the loads of the plan; None of a motion in time.
 
     A path that starts from that of a similar design may pass where it should end. Where the design
@@ -324,13 +331,13 @@ def _from_rest(scene: Scene, plan: Plan) -> Evaluator | None:
     if not isinstance(plan.solver, StaticSolver):
         return None
     made = replace(plan, solver=plan.confirming)
-    memory = None if scene.objective.snap_margin is None else _Unsnapped(scene, made)
+    memory = None if scene.objective.snap_margin is None else _SnapCheck(scene, made)
     at = np.searchsorted(made.solver.output_times, sample_times(scene) * (1 - 1e-9))
     return Evaluator(scene, made, memory, at=at)
 
 
-class _Unsnapped:
-    """Remembers nothing, and refuses designs whose structure snaps (``Memory``).
+class _SnapCheck:
+    """Rejects designs whose structure snaps; stores nothing (``Memory``).
 
     As the constraint does, it looks at the perfect structure: copies count by their losses alone.
     """

@@ -80,14 +80,16 @@ class ReactionMimicking(NamedTuple):
 
     def force(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Sums the drive's force (n_cases, n_times, 2), N, in (n_cases, n_times, n_units, 3)."""
-        return jnp.einsum("ctld,cl->ctd", self._pulls(displacement, parameters), self.sign)
+        return jnp.einsum(
+            "ctld,cl->ctd", self._ligament_forces(displacement, parameters), self.sign
+        )
 
     def carried(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Sums (n_cases, n_times) the magnitudes of the ligaments' forces in states, N."""
-        each = jnp.linalg.norm(self._pulls(displacement, parameters), axis=3)
+        each = jnp.linalg.norm(self._ligament_forces(displacement, parameters), axis=3)
         return jnp.einsum("ctl,cl->ct", each, np.abs(self.sign))
 
-    def _pulls(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
+    def _ligament_forces(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Forces (n_cases, n_times, n, 2) at the first ends of the ligaments, N."""
         ends = jnp.asarray(displacement)[..., self.ligament_units, :]
         arm, vector = parameters.arm[self.ligaments], parameters.vector[self.ligaments]

@@ -11,14 +11,14 @@ import numpy as np
 from jax import Array
 
 from sim.core import Floats, Numbers
-from sim.energy import counted_from_rest
+from sim.energy import parameters_at_rest
 from sim.quasistatics import StaticSolver
 from sim.scene.scene import Scene
 from sim.solvers import LinearRamp, concrete, differentiable_motion
 from sim.structure import ConcreteParameters, Parameters, parameters, parameters_at, shape
 
 Passed: TypeAlias = float | Floats | tuple[Any, ...]
-"""Lists the types that a map depends on besides: numbers, arrays, and tuples of them."""
+"""Types of a map's further arguments: numbers, arrays, and tuples of them."""
 
 
 class ParameterMap:
@@ -56,12 +56,12 @@ def rest_motion(scene: Scene, values: Parameters[Any]) -> Array:
     Raises:
         SimulationError: there is no equilibrium.
     """
-    still = scene.loads.following(LinearRamp(0.0, 1.0, 0.0))
+    at_rest = scene.loads.following(LinearRamp(0.0, 1.0, 0.0))
     solver = StaticSolver(scene.topology, np.ones(1))
-    return differentiable_motion(solver, values, (still,), designed=True).displacement[0, 0]
+    return differentiable_motion(solver, values, (at_rest,), designed=True).displacement[0, 0]
 
 
-class RestingMap(ParameterMap):
+class RestStateMap(ParameterMap):
     """Maps designs whose shims are bent to their parameters as they rest.
 
     The slots of the scene turn with the design; ``of_design`` gives the parameters before the shims
@@ -73,7 +73,7 @@ class RestingMap(ParameterMap):
     ) -> None:
         super().__init__(of_design, *passed)
         self._scene = scene
-        self._from_rest = jax.jit(partial(counted_from_rest, scene.lattice))
+        self._from_rest = jax.jit(partial(parameters_at_rest, scene.lattice))
 
     def __call__(self, design: Numbers) -> Parameters[Array]:
         """Parameters at rest of a design vector (n_variables,); differentiable by it.
@@ -103,7 +103,7 @@ def parameters_of_design(scene: Scene) -> ParameterMap:
 
     as_designed = np.zeros((lattice.n_groups, 2)), np.ones((3, lattice.n_ligaments))
     if space.turning:
-        return RestingMap(scene, of_design, *as_designed)
+        return RestStateMap(scene, of_design, *as_designed)
     return ParameterMap(of_design, *as_designed)
 
 

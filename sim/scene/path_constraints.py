@@ -1,4 +1,4 @@
-"""Constrains designs by what they do under load: no snap on the way, no foil strained too far."""
+"""Constrains designs under load: no snap on the path, no strain of foil beyond its limit."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -33,16 +33,16 @@ LOG = logging.getLogger(__name__)
 SHARPNESS = 64
 """p of the p-norm that stands for the largest strain: up to some 10 % above it."""
 
-WATCHED = 12
-"""Evaluations for which the way to a load is looked at after a snap on it."""
+MONITORED = 12
+"""Evaluations for which a load increment is monitored after a snap in it."""
 
 Slope = tuple[float, ConcreteParameters]
 """A constraint value, and its derivatives by all parameters."""
 
 
-SHARES = np.linspace(1.0, 0.1, 10)
+START_SHARES = np.linspace(1.0, 0.1, 10)
 """Of a start that snaps, the larger ones first, that may serve in its place."""
-REACH, ROUNDS = 1.0, 20
+START_STEP, START_ROUNDS = 1.0, 20
 """Largest change of a variable in a round that leads a start out of its snaps, mm; and rounds."""
 
 
@@ -58,7 +58,7 @@ def check_unsnapped(record: StaticRecord, load: float) -> None:
 
 
 class PathConstraints:
-    """Evaluates what a design must keep to, at rest and under its loads.
+    """Evaluates the constraints on a design, at rest and under its loads.
 
     Below the geometric constraints there is, in mm, with ``scene.objective.snap_margin``, one value
     for each load of the loss and each case: lambda / bound - 1 of the smallest eigenvalue lambda of
@@ -96,7 +96,7 @@ class PathConstraints:
         self._numbers = plan.simulated
         self._of_design = parameters_of_design(scene)
         self.bound: float | None = None
-        self._watched: dict[tuple[int, int], int] = {}  # evaluations left for case and load
+        self._monitored: dict[tuple[int, int], int] = {}  # evaluations left for case and load
         if share is not None:
             if not isinstance(solver, StaticSolver):
                 raise ValueError("a snap margin belongs to a static scene")
@@ -121,15 +121,15 @@ class PathConstraints:
         values, slopes = self._under_load(design)
         return np.append(geometric, values), sp.csr_array(sp.vstack([jacobian, slopes]))
 
-    def drawn_back(self, start: Floats) -> Floats:
-        """Leads a design vector out of its snaps; where that fails, shortens it first.
+    def recover_start(self, start: Floats) -> Floats:
+        """Projects a start on the constraints, out of snaps; where that fails, shortens it first.
 
         Returns:
             the design vector (n_variables,), zero if none between it and the start serves.
         """
-        for share in SHARES if start.any() else ():
+        for share in START_SHARES if start.any() else ():
             LOG.info("leading %.0f %% of the start out of its snaps, if any", 100 * share)
-            found = feasible_design(self, share * start, REACH, ROUNDS)
+            found = feasible_design(self, share * start, START_STEP, START_ROUNDS)
             if found is not None:
                 return found
             LOG.info("no design near it keeps to the constraints")
@@ -155,74 +155,91 @@ class PathConstraints:
 
     @property
     def state(self) -> Floats:
-        """Lists the ways that are watched after a snap: case, load, evaluations left of each."""
-        return np.array([(*way, left) for way, left in self._watched.items()], float).ravel()
+        """Lists monitored increments, which had a snap: case, load, evaluations left of each."""
+        return np.array(
+            [(*increment, left) for increment, left in self._monitored.items()], float
+        ).ravel()
 
     @state.setter
-    def state(self, watched: Floats) -> None:
-        rows = watched.astype(int).reshape(-1, 3).tolist()
-        self._watched = {(case, load): left for case, load, left in rows}
+    def state(self, monitored: Floats) -> None:
+        rows = monitored.astype(int).reshape(-1, 3).tolist()
+        self._monitored = {(case, load): left for case, load, left in rows}
 
     def _under_load(self, design: Floats) -> tuple[Floats, Floats]:
-        """Values (n,) of all loads in mm, and their derivatives (n, n_variables)."""
+        """Evaluates values (n,) of all loads in mm, and their derivatives (n, n_variables)."""
         _, values, slopes = self._evaluate(design)
         return values, slopes
 
     def _solve(self, design: Floats) -> tuple[float, Floats, Floats]:
-        """Values and derivatives in the form of an evaluation, whose loss is zero."""
+        """Computes values and derivatives in the form of an evaluation, whose loss is zero."""
         values = concrete(self._of_design(design))
         motion, _, records = solve_cases(self._path, values, self._cases)
-        every = [*self._snaps(values, records), *self._strains(values, motion, records)]
+        every = [
+            *self._eigenvalue_constraints(values, records),
+            *self._strain_constraints(values, motion, records),
+        ]
         rows = [self._of_design.pull_back(design, Parameters(*bar)) for _, bar in every]
         return 0.0, np.array([value for value, _ in every]), np.stack(rows)
 
-    def _snaps(self, values: ConcreteParameters, records: Records) -> Iterator[Slope]:
+    def _eigenvalue_constraints(
+        self, values: ConcreteParameters, records: Records
+    ) -> Iterator[Slope]:
         if self.bound is None:
             return
-        self._watched = {way: left - 1 for way, left in self._watched.items() if left > 1}
+        self._monitored = {
+            increment: left - 1 for increment, left in self._monitored.items() if left > 1
+        }
         for case, (drive, record) in enumerate(zip(self._cases, records.records, strict=True)):
             for jump in np.flatnonzero(record.jumped):
-                self._watched[case, int(jump)] = WATCHED
+                self._monitored[case, int(jump)] = MONITORED
             for load in range(len(self._solver.output_times)):
                 passed = np.flatnonzero(self._load_of == load)
                 found = [
-                    self._smallest_between(values, drive, record, way)
-                    for way in map(int, passed)
-                    if (case, way) in self._watched
+                    self._eigenvalue_between(values, drive, record, increment)
+                    for increment in map(int, passed)
+                    if (case, increment) in self._monitored
                 ]
-                at_loads = self._smallest_at(values, record, passed)
+                at_loads = self._eigenvalue_at_loads(values, record, passed)
                 value, bar = min([at_loads, *found], key=lambda slope: slope[0])
                 yield value / self.bound - 1.0, Parameters(*(part / self.bound for part in bar))
 
-    def _smallest_at(self, values: ConcreteParameters, record: StaticRecord, passed: Ints) -> Slope:
+    def _eigenvalue_at_loads(
+        self, values: ConcreteParameters, record: StaticRecord, passed: Ints
+    ) -> Slope:
         """Finds the smallest eigenvalue at some loads; infinite if the path ends before them."""
         reached = passed[np.isfinite(record.states[passed]).all(axis=1)]
         if not len(reached):
-            return _beyond(values)
+            return _no_eigenvalue(values)
         softest = reached[record.eigenvalue[reached].argmin()]
         topology = record.topology or self._solver.topology
         return eigenvalue_and_slopes(topology, values, record.states[softest])
 
-    def _smallest_between(
-        self, values: ConcreteParameters, drive: PrescribedMotion, record: StaticRecord, way: int
+    def _eigenvalue_between(
+        self,
+        values: ConcreteParameters,
+        drive: PrescribedMotion,
+        record: StaticRecord,
+        increment: int,
     ) -> Slope:
         """Finds that of the softest point between a load and the one before; infinite if none."""
-        before = record.states[way - 1] if way else np.zeros_like(record.states[way])
+        before = (
+            record.states[increment - 1] if increment else np.zeros_like(record.states[increment])
+        )
         if not np.isfinite(before).all():
-            return _beyond(values)
+            return _no_eigenvalue(values)
         loads = np.append(0.0, self._path.output_times)
-        begin, end = float(loads[way]), float(loads[way + 1])
+        begin, end = float(loads[increment]), float(loads[increment + 1])
         topology = record.topology or self._solver.topology
         found = softest_point(topology, values, drive, (begin, before), end)
         folds = found is not None and found.eigenvalue < 0.0
         if found is not None and folds:
             share, value = found.load / loads[-1], found.eigenvalue
             LOG.debug("a snap at %.3g of the path: smallest eigenvalue %.2g N/mm", share, value)
-        if record.jumped[way] and not folds:  # nothing leads out of this snap
+        if record.jumped[increment] and not folds:  # nothing leads out of this snap
             check_unsnapped(record, loads[-1])
-        return _beyond(values) if found is None else (found.eigenvalue, found.slopes)
+        return _no_eigenvalue(values) if found is None else (found.eigenvalue, found.slopes)
 
-    def _strains(
+    def _strain_constraints(
         self, values: ConcreteParameters, motion: Floats, records: Records
     ) -> Iterator[Slope]:
         if self._foil is None:
@@ -230,14 +247,14 @@ class PathConstraints:
         for drive, one, record in zip(self._cases, motion, records.records, strict=True):
             ratio, (bar_motion, direct) = self._strain(one, values)
             bar = np.asarray(bar_motion)[None]
-            alone = Records(values, [drive], [record])
-            through = adjoint_cases(self._path, alone, bar, np.zeros_like(bar)).parameters
+            case_record = Records(values, [drive], [record])
+            through = adjoint_cases(self._path, case_record, bar, np.zeros_like(bar)).parameters
             parts = (-one - other for one, other in zip(direct, through, strict=True))
             yield 1.0 - float(ratio), ConcreteParameters(*map(np.asarray, parts))
 
 
-def _beyond(values: ConcreteParameters) -> Slope:
-    """Stands for the eigenvalue where a path does not go."""
+def _no_eigenvalue(values: ConcreteParameters) -> Slope:
+    """Makes an infinite eigenvalue, of loads that a path does not reach."""
     return np.inf, ConcreteParameters(*(np.zeros_like(part) for part in values))
 
 

@@ -52,7 +52,7 @@ class Plan:
         return replace(self.solver, output_times=loads)
 
     def describe(self) -> str:
-        """Says the plan in words, a line a decision."""
+        """Describes the plan in words, a line a decision."""
         return "\n".join((*self.decisions, *(f"skipped: {line}" for line in self.skipped)))
 
     def record(self) -> dict[str, Any]:

@@ -26,7 +26,7 @@ class Relaxed(NamedTuple):
 
 
 class AsBuilt(NamedTuple):
-    """Tells what bent shims make of a structure."""
+    """Holds the effect of bent shims on a structure."""
 
     turn: Floats  # (n_units,) by which units turn as the shims relax before any load, rad
     loss_as_designed: float  # weighted mean over the load cases
@@ -48,7 +48,7 @@ def relaxed(scene: Scene, vertices: Floats | None = None) -> Relaxed:
     values = concrete_parameters(scene, network)
     motion = np.asarray(rest_motion(scene, values))
     rest = _rest_state(arrays_of(scene.lattice), values, motion)
-    return Relaxed(_counted_from(scene, rest), np.asarray(rest.vertices), motion)
+    return Relaxed(_with_rest_state(scene, rest), np.asarray(rest.vertices), motion)
 
 
 def at_rest(scene: Scene, vertices: Floats) -> tuple[Scene, Floats]:
@@ -65,7 +65,7 @@ def at_rest(scene: Scene, vertices: Floats) -> tuple[Scene, Floats]:
     return relaxed(scene, vertices)[:2]
 
 
-def _counted_from(scene: Scene, rest: RestState) -> Scene:
+def _with_rest_state(scene: Scene, rest: RestState) -> Scene:
     """Replaces the lattice by the one at rest, and the natural state by what is left of it."""
     stretch, shear, bend = np.asarray(rest.natural).T
     material = scene.structure.material._replace(

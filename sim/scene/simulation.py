@@ -241,7 +241,7 @@ def _with_reaction(scene: Scene, motion: RelativeMimicking) -> ReactionMimicking
     """
     intact, asked = scene.objective.reference, scene.objective
     assert intact is not None
-    of_intact = ReactionMimicking(motion, 1.0, *_cut(intact), np.zeros(2), np.ones(1))
+    of_intact = ReactionMimicking(motion, 1.0, *_cut_ligaments(intact), np.zeros(2), np.ones(1))
     moved = simulate(intact, vertices=intact.lattice.vertices)
     target = np.asarray(of_intact.force(moved.displacement, moved.parameters))
     carried = np.asarray(of_intact.carried(moved.displacement, moved.parameters))
@@ -257,10 +257,10 @@ def _with_reaction(scene: Scene, motion: RelativeMimicking) -> ReactionMimicking
             "objective.reaction",
         )
     whole = net if asked.steps is None else net / np.sqrt(asked.steps)
-    return ReactionMimicking(motion, asked.reaction, *_cut(scene), target, whole)
+    return ReactionMimicking(motion, asked.reaction, *_cut_ligaments(scene), target, whole)
 
 
-def _cut(scene: Scene) -> tuple[Ints, Ints, Ints]:
+def _cut_ligaments(scene: Scene) -> tuple[Ints, Ints, Ints]:
     """Finds the ligaments that any drive's units are cut off by, their units, and signs."""
     ends = scene.lattice.ligament_units
     driven = np.array([np.isin(ends, case.leading) for case in scene.loads.cases]).astype(np.int64)

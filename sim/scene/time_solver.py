@@ -43,7 +43,7 @@ LOG = logging.getLogger(__name__)
 TURN_ALLOWANCE = np.deg2rad(30.0)
 """Relative rotation that a ligament's units may make before its contact is no longer skipped."""
 
-SLOW = 0.75
+SLOW_DRIVE = 0.75
 """Drives below this fraction of the lowest eigenfrequency may excite no waves worth resolving."""
 
 STABLE_FRACTION = {"draft": 0.95, "default": 0.95, "tight": 0.9}
@@ -107,30 +107,30 @@ def time_solver(
     Raises:
         SimulationError: a unit has no mass.
     """
-    error = _Error(scene, values, float(times[-1]))
+    error = _ErrorEstimate(scene, values, float(times[-1]))
     explicit = _explicit(scene, values, times, threads)
-    if _implicit_first(scene, values, decisions):
+    if _tries_implicit(scene, values, decisions):
         auto = scene.numerics.integrator == "auto"
         stored = 3 * 4 * scene.topology.n_dofs * np.dtype(float).itemsize
         most = explicit.n_steps // EXPLICIT_STEPS if auto else MOST_MEMORY // stored
         try:
             first = _first_grid(scene, values, times, threads, most)
-            solver, left = _shortened(first, None, _parts, IMPLICIT_ORDER, error, most)
+            solver, left = _refine(first, None, _divide_steps, IMPLICIT_ORDER, error, most)
         except SimulationError:
             if not auto:
                 raise
             left = np.inf
         if left <= 1.0 or not auto:
             kind = "adapted" if scene.loads.drive_frequency is None else "graded"
-            told = f"grid: {len(solver.times) - 1} {kind} steps over {times[-1]:.6g} s, frozen"
-            decisions.extend([told, error.told(left, warnings)])
+            report = f"grid: {len(solver.times) - 1} {kind} steps over {times[-1]:.6g} s, frozen"
+            decisions.extend([report, error.report(left, warnings)])
             return solver if gradient else replace(solver, tolerance=error.tolerance)
         decisions.append("explicit: implicit steps as short as the accuracy asks for take longer")
-    rough = replace(explicit, splitting=LEAPFROG, n_steps=_same_share(explicit.n_steps))
+    rough = replace(explicit, splitting=LEAPFROG, n_steps=_equivalent_steps(explicit.n_steps))
     most = 2**MOST_DOUBLINGS * explicit.n_steps
-    chosen, left = _shortened(rough, explicit, _doubled, EXPLICIT_ORDER, error, most)
-    told = f"grid: {chosen.n_steps} equal steps over {times[-1]:.6g} s"
-    decisions.extend([told, error.told(left, warnings)])
+    chosen, left = _refine(rough, explicit, _double_steps, EXPLICIT_ORDER, error, most)
+    report = f"grid: {chosen.n_steps} equal steps over {times[-1]:.6g} s"
+    decisions.extend([report, error.report(left, warnings)])
     return chosen
 
 
@@ -139,22 +139,23 @@ def expected_steps(
 ) -> tuple[Literal["implicit", "explicit"], int]:
     """Guesses integrator and number of steps of a motion, without solving for any."""
     explicit, asked = _explicit(scene, values, times, 1).n_steps, scene.numerics.integrator
-    if _implicit_first(scene, values, [], SLOW / 2):  # nearer to resonance they are cut too often
+    # nearer to resonance implicit steps are cut too often
+    if _tries_implicit(scene, values, [], SLOW_DRIVE / 2):
         implicit = len(_graded(scene, float(times[-1]))[0]) - 1
         if asked != "auto" or implicit * EXPLICIT_STEPS <= explicit:
             return "implicit", implicit
     return "explicit", explicit
 
 
-def _same_share(n_steps: int) -> int:
+def _equivalent_steps(n_steps: int) -> int:
     """Counts the leapfrog's steps at the same share of its stability limit."""
     return int(np.ceil(n_steps * BLANES_MOAN.stability / LEAPFROG.stability))
 
 
-def _implicit_first(
-    scene: Scene, values: ConcreteParameters, decisions: list[str], slow: float = SLOW
+def _tries_implicit(
+    scene: Scene, values: ConcreteParameters, decisions: list[str], slow: float = SLOW_DRIVE
 ) -> bool:
-    """Tells whether an implicit grid is tried, and says why."""
+    """Decides whether an implicit grid is tried, and appends the reason."""
     if scene.numerics.integrator != "auto":
         decisions.append("integrator as asked for")
         return scene.numerics.integrator == "implicit"
@@ -172,12 +173,12 @@ def _implicit_first(
     return driven < slow * lowest
 
 
-class _Error:
+class _ErrorEstimate:
     """Compares solutions of all different drives with what the accuracy allows."""
 
     def __init__(self, scene: Scene, values: ConcreteParameters, end: float) -> None:
         self._scene, self._values, self._end = scene, values, end
-        self._drives = different_drives(scene)
+        self._drives = distinct_drives(scene)
         self._rule, self._accuracy = RULES[scene.numerics.accuracy], scene.numerics.accuracy
         region, every = scene.objective.region, np.arange(scene.lattice.n_units)
         self._units = region if len(region) else np.setdiff1d(every, scene.loads.driven)
@@ -209,7 +210,7 @@ class _Error:
             return moved, replace(solver, times=longest)
         return moved, solver
 
-    def between(self, one: list[Floats] | None, other: list[Floats] | None) -> float:
+    def relative_difference(self, one: list[Floats] | None, other: list[Floats] | None) -> float:
         """Returns the greatest difference of two solutions, over what is allowed."""
         if one is None or other is None:
             return np.inf
@@ -223,8 +224,8 @@ class _Error:
         motion = float(np.sqrt(np.sum((one - other) ** 2) / size))
         return max(loss / self._rule.loss, motion / self._rule.motion)
 
-    def told(self, left: float, warnings: list[str]) -> str:
-        """Says how much of the allowed error is estimated to be there."""
+    def report(self, left: float, warnings: list[str]) -> str:
+        """Reports the estimated error over the allowed one."""
         allowed = f"loss {self._rule.loss:g}, motion {self._rule.motion:g}"
         line = f"estimate: {left:.2g} of the error that {self._accuracy} allows ({allowed})"
         if left > 1.0:
@@ -233,29 +234,29 @@ class _Error:
         return line
 
 
-def different_drives(scene: Scene) -> list[PrescribedMotion]:
+def distinct_drives(scene: Scene) -> list[PrescribedMotion]:
     """Lists the drives of the load cases; the first of those that differ by direction alone."""
     found: dict[object, PrescribedMotion] = {}
     for drive in scene.loads.cases:
         motion = drive.motion
-        besides = _besides_direction(motion) if isinstance(motion, DIRECTED) else id(motion)
+        undirected = _undirected_numbers(motion) if isinstance(motion, DIRECTED) else id(motion)
         control = None if drive.control is None else drive.control.tobytes()
-        found.setdefault((type(motion), tuple(drive.units), control, besides), drive)
+        found.setdefault((type(motion), tuple(drive.units), control, undirected), drive)
     return list(found.values())
 
 
-def _besides_direction(motion: DIRECTED) -> tuple[float | None, ...]:
-    """Lists all numbers of a law but its direction, of arrays as well."""
+def _undirected_numbers(motion: DIRECTED) -> tuple[float | None, ...]:
+    """Lists all numbers of a law but its direction."""
     undirected = motion._replace(direction=0.0)
     return tuple(None if value is None else float(value) for value in undirected)
 
 
-def _shortened(
+def _refine(
     rough: S,
     finer: S | None,
     cut: Callable[[S, float], tuple[S, int]],
     order: float,
-    error: _Error,
+    error: _ErrorEstimate,
     most: int,
 ) -> tuple[S, float]:
     """Cuts steps until the error is allowed; also returns the estimate, over the allowed one.
@@ -266,10 +267,10 @@ def _shortened(
     `order` is that of convergence, cautiously; `most` bounds the steps.
     """
     seen, rough = error.motions(rough)
-    kept, finer = (rough, twice_as_fine(rough)) if finer is None else (None, finer)
+    kept, finer = (rough, with_halved_steps(rough)) if finer is None else (None, finer)
     parts, (motions, finer) = 2, error.motions(finer)
     while motions is not None:
-        left = error.between(seen, motions) / (parts**order - 1.0)
+        left = error.relative_difference(seen, motions) / (parts**order - 1.0)
         if kept is not None and left * parts**order <= 1.0:
             return kept, left * parts**order
         if left <= 1.0:
@@ -282,17 +283,17 @@ def _shortened(
     return finer, np.inf
 
 
-def _parts(solver: ImplicitSolver, left: float) -> tuple[ImplicitSolver, int]:
+def _divide_steps(solver: ImplicitSolver, left: float) -> tuple[ImplicitSolver, int]:
     parts = int(np.clip(np.ceil(min(left, 1e3) ** (1 / IMPLICIT_ORDER)), 2, MOST_PARTS))
     return replace(solver, times=time_grid.divided(solver.times, parts)), parts
 
 
-def _doubled(solver: ExplicitSolver, left: float) -> tuple[ExplicitSolver, int]:
+def _double_steps(solver: ExplicitSolver, left: float) -> tuple[ExplicitSolver, int]:
     del left
-    return twice_as_fine(solver), 2
+    return with_halved_steps(solver), 2
 
 
-def twice_as_fine(solver: S) -> S:
+def with_halved_steps(solver: S) -> S:
     """Cuts every step in two."""
     if isinstance(solver, ImplicitSolver):
         return replace(solver, times=time_grid.halved(solver.times))
@@ -320,20 +321,20 @@ def _first_grid(
         scene.loads.drive_frequency,
     )
     steps, largest = _graded(scene, end)
-    drives = different_drives(scene)
+    drives = distinct_drives(scene)
     stops = _breakpoints(drives, end)
     solver = ImplicitSolver(
         replace(scene.topology, storages=FASTEST), steps, times, NEWTON, threads,
         turn_allowance=TURN_ALLOWANCE,
     )  # fmt: skip
     if frequency is not None:
-        return replace(solver, times=time_grid.through(steps, stops))
+        return replace(solver, times=time_grid.insert_times(steps, stops))
     sizes = [_size(scene, end, values, drive, stops) for drive in drives]
     grids = [
         adapted(solver, values, drive, rule.per_step * size, rule.first, largest, stops, most).times
         for drive, size in zip(drives, sizes, strict=True)
     ]
-    return replace(solver, times=time_grid.through(grids[0], np.concatenate(grids)))
+    return replace(solver, times=time_grid.insert_times(grids[0], np.concatenate(grids)))
 
 
 def _breakpoints(drives: Sequence[PrescribedMotion], end: float) -> Floats:
@@ -374,7 +375,7 @@ def _explicit(
     # a heavy or soft structure is stable with steps far too long for its drive
     if (frequency := scene.loads.drive_frequency) is not None:
         largest = min(largest, 1 / (frequency * RULES[accuracy].per_period))
-    for drive in different_drives(scene):
+    for drive in distinct_drives(scene):
         gaps = np.diff(breakpoints(drive.motion, end))
         largest = min(largest, max(gaps.min(initial=np.inf) / 2, largest / 16))
     return ExplicitSolver(scene.topology, end, int(np.ceil(end / largest)), times, threads)

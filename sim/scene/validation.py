@@ -20,18 +20,18 @@ LOG = logging.getLogger(__name__)
 
 SHORTEST_LIGAMENT = 1e-6
 """Of a ligament at rest, over the spacing: its law divides by its length."""
-ROUNDING = 1e-5
+VECTOR_TOLERANCE = 1e-5
 """Over the spacing, by which a ligament may differ between given vertices and the lattice."""
 JUMP, SOME_JUMP = 0.05, 0.01
 """Of a motion or force at its start, over its largest value: refused, and warned of."""
-ACROSS = 1e-9
-"""Part of a motion, over its largest, up to which it is across a direction but for rounding."""
-SUM = 1e-6
+ACROSS_TOLERANCE = 1e-9
+"""Part of a motion, over its largest, up to which rounding alone makes it act across."""
+SUM_TOLERANCE = 1e-6
 """By which the sum of weights may be off one."""
-INSTANTS = 513
+N_INSTANTS = 513
 """At which a motion is looked at."""
 _NUMBERS = (int, float, np.ndarray, np.generic, jax.Array)
-LARGE = 100_000
+LARGE_SIZE = 100_000
 """Unknowns from which on memory and time are told in advance."""
 
 
@@ -61,24 +61,24 @@ def check_scene(
     if margin is not None and not margin > 0.0:
         what = f"a snap margin of {margin:g} bounds nothing; give one above zero, or None"
         raise SceneError(what, "objective.snap_margin")
-    for what, key in _meaningless(scene):
+    for what, key in _invalid_numbers(scene):
         raise SceneError(what, key)
-    found = [*_loose_units(scene), *_size(scene, asked)]
+    found = [*_hanging_units(scene), *_check_size(scene, asked)]
     for number, drive in enumerate(scene.loads.cases):
-        _law(drive, f"load case {number}")
+        _check_law(drive, f"load case {number}")
         if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(drive.motion)):
-            found += _drive(scene, drive, f"load case {number}", float(asked[-1]))
+            found += _check_drive(scene, drive, f"load case {number}", float(asked[-1]))
     for warning in found:
         _warn(warning)
     return tuple(found)
 
 
-def _meaningless(scene: Scene) -> Iterator[tuple[str, str]]:
+def _invalid_numbers(scene: Scene) -> Iterator[tuple[str, str]]:
     """Lists numbers that a loss or a law would be computed with and that have no meaning there."""
     loads, asked, law = scene.loads, scene.objective, scene.structure.contact
     shares, cases = [] if loads.weights is None else np.asarray(loads.weights).tolist(), loads.cases
     if loads.weights is not None and not (
-        len(shares) == len(cases) and min(shares) >= 0.0 and abs(sum(shares) - 1.0) <= SUM
+        len(shares) == len(cases) and min(shares) >= 0.0 and abs(sum(shares) - 1.0) <= SUM_TOLERANCE
     ):
         what = f"the weights {shares} of {len(cases)} load cases; give one of each, zero or more,"
         yield f"{what} of sum 1", "drive.weights"
@@ -125,14 +125,14 @@ def check_units(lattice: Lattice, vertices: Floats) -> None:
             f" ({lengths.min():.3g} mm); keep corners of neighbours apart",
             "lattice.ligament_length",
         )
-    _keep_vectors(lattice, vertices)
+    _check_vectors(lattice, vertices)
 
 
-def _keep_vectors(lattice: Lattice, vertices: Floats) -> None:
+def _check_vectors(lattice: Lattice, vertices: Floats) -> None:
     """Refuses vertices between which ligaments are other than the lattice's: its own are solved."""
     ends = np.asarray(vertices)[lattice.ligaments]
     away = np.linalg.norm(ends[:, 1] - ends[:, 0] - lattice.ligament_vectors, axis=1)
-    if away.max(initial=0.0) > ROUNDING * lattice.spacing:
+    if away.max(initial=0.0) > VECTOR_TOLERANCE * lattice.spacing:
         one, other = lattice.ligament_units[away.argmax()]
         raise SceneError(
             f"the vertices change the ligament between units {one} and {other} by {away.max():.3g}"
@@ -161,12 +161,12 @@ def _check_ids(scene: Scene) -> None:
             raise SceneError(f"there is no unit {wrong[0]}; the lattice has 0 to {n - 1}", key)
     for key in ("drive.units", "objective.region"):
         for each in named[key]:
-            _once(each, key)
+            _check_unique(each, key)
     for dof in {dof for each in loads.supports for dof in each.dofs} - set(DOFS):
         raise SceneError(f"there is no {dof!r}; the dofs are {', '.join(DOFS)}", "supports")
 
 
-def _once(ids: Ints, key: str) -> None:
+def _check_unique(ids: Ints, key: str) -> None:
     found, count = np.unique(ids, return_counts=True)
     if len(twice := found[count > 1]) > 0:
         raise SceneError(f"unit {twice[0]} is listed twice, and would count so; list it once", key)
@@ -183,7 +183,7 @@ def check_cases(scene: Scene, numbers: Iterable[int]) -> None:
         raise SceneError(f"there is no load case {wrong}; the scene has 0 to {n - 1}", "drive")
 
 
-def _loose_units(scene: Scene) -> Iterator[str]:
+def _hanging_units(scene: Scene) -> Iterator[str]:
     count = np.bincount(scene.lattice.ligament_units.ravel(), minlength=scene.lattice.n_units)
     loose = np.setdiff1d(np.flatnonzero(count == 1), scene.loads.held // 3)
     if len(loose) > 0:
@@ -194,9 +194,9 @@ def _loose_units(scene: Scene) -> Iterator[str]:
         )
 
 
-def _size(scene: Scene, times: Floats) -> Iterator[str]:
+def _check_size(scene: Scene, times: Floats) -> Iterator[str]:
     """Estimates memory and time of a large structure."""
-    if count_unknowns(scene) < LARGE:
+    if count_unknowns(scene) < LARGE_SIZE:
         return
     n, memory, seconds = estimate_cost(scene, times)
     told = f"{scene.lattice.n_units} units: {n} unknowns, about {memory / 1e9:.2g} GB"
@@ -208,20 +208,20 @@ def _size(scene: Scene, times: Floats) -> Iterator[str]:
     yield f"{told}{time}"
 
 
-def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iterator[str]:
+def _check_drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iterator[str]:
     for one in single_motions(drive.motion):
         if isinstance(one, TimeSeries):
-            _series(one, case, end)
-    instants = np.linspace(0.0, end, INSTANTS)
+            _check_series(one, case, end)
+    instants = np.linspace(0.0, end, N_INSTANTS)
     with jax.ensure_compile_time_eval():  # under jax.jit, which is refused further on
-        course = _course(drive, instants, case)
-    _clamped(scene, drive, course, case)
-    whole = course
+        history = _sample_motion(drive, instants, case)
+    _check_clamped(scene, drive, history, case)
+    every_dof = history
     if drive.control is not None:
-        course = np.where(drive.control == DISPLACEMENT, course, 0.0)
-    far = float(np.hypot(course[..., 0], course[..., 1]).max(initial=0.0))
+        history = np.where(drive.control == DISPLACEMENT, history, 0.0)
+    far = float(np.hypot(history[..., 0], history[..., 1]).max(initial=0.0))
     size = np.ptp(scene.lattice.vertices, axis=0)
-    turned_over = bool(np.abs(course[..., 2]).max(initial=0.0) > np.pi / 2)
+    turned_over = bool(np.abs(history[..., 2]).max(initial=0.0) > np.pi / 2)
     if not far <= (1 + turned_over) * size.max():  # a strip's end, folded back, goes twice as far
         raise SceneError(
             f"{case} moves its units by {far:.4g} mm, further than {'twice ' * turned_over}the"
@@ -230,13 +230,13 @@ def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iter
         )
     if scene.loads.static:
         others = np.setdiff1d(scene.loads.held, displaced(drive))
-        _held_back(others, course, case)
-        _supported(scene, case)
+        _check_resistance(others, history, case)
+        _check_supports(scene, case)
         return
-    yield from _jumps(scene, drive, whole, case)
+    yield from _check_start(scene, drive, every_dof, case)
 
 
-def _law(drive: PrescribedMotion, case: str) -> None:
+def _check_law(drive: PrescribedMotion, case: str) -> None:
     """Refuses motions that are no laws: of numbers alone, which NumPy and JAX can compute."""
     remedy = "give sim.TimeSeries(times, motion) of its values, or a NamedTuple of its numbers"
     remedy += " whose __call__ takes times (n_times,) and computes in times.__array_namespace__()"
@@ -260,34 +260,36 @@ def _holds_numbers(motion: object) -> bool:
     return callable(motion) and all(isinstance(leaf, _NUMBERS) for leaf in leaves)
 
 
-def _course(drive: PrescribedMotion, instants: Floats, case: str) -> Floats:
+def _sample_motion(drive: PrescribedMotion, instants: Floats, case: str) -> Floats:
     """Computes the motion (n_times, n_driven or 1, 3) at some times; refuses other shapes."""
-    course = np.asarray(drive.motion(instants), dtype=float)
+    history = np.asarray(drive.motion(instants), dtype=float)
     n_times, n_units = len(instants), len(drive.units)
-    if course.shape not in {(n_times, 3), (n_times, n_units, 3)}:
+    if history.shape not in {(n_times, 3), (n_times, n_units, 3)}:
         raise SceneError(
-            f"{case} moves {n_units} units by motions of the shape {course.shape} at {n_times}"
+            f"{case} moves {n_units} units by motions of the shape {history.shape} at {n_times}"
             f" times; give ux, uy, theta at each: ({n_times}, 3), or ({n_times}, {n_units}, 3)",
             "drive",
         )
-    return course.reshape(n_times, -1, 3)
+    return history.reshape(n_times, -1, 3)
 
 
-def _jumps(scene: Scene, drive: PrescribedMotion, course: Floats, case: str) -> Iterator[str]:
+def _check_start(
+    scene: Scene, drive: PrescribedMotion, history: Floats, case: str
+) -> Iterator[str]:
     """Refuses displacements, or forces, that do not start at zero; warns of small ones.
 
     The course (n_times, n_driven, 3) has both; either is measured by its own largest value.
     """
-    size, arm = np.abs(course).max(axis=0), scene.lattice.spacing / 2
-    sizes = np.abs(np.where(size > ACROSS * size.max(initial=0.0), course, 0.0))
+    size, arm = np.abs(history).max(axis=0), scene.lattice.spacing / 2
+    sizes = np.abs(np.where(size > ACROSS_TOLERANCE * size.max(initial=0.0), history, 0.0))
     control = DISPLACEMENT if drive.control is None else drive.control
     measured = any(isinstance(one, TimeSeries) for one in single_motions(drive.motion))
     way, key = ("by a delay of three widths or rise times or more", "drive.delay")
     if measured:
         way, key = ("from zero in all columns", "drive.file")
     for kind, what, turned in ((DISPLACEMENT, "displacement", arm), (FORCE, "force", 1.0 / arm)):
-        whole = np.where(control == kind, sizes * [1.0, 1.0, turned], 0.0).max(axis=(1, 2))
-        jump = whole[0] / max(whole.max(), 1e-300)
+        every_dof = np.where(control == kind, sizes * [1.0, 1.0, turned], 0.0).max(axis=(1, 2))
+        jump = every_dof[0] / max(every_dof.max(), 1e-300)
         said = f"{case} starts with a jump, of {jump:.2g} of its largest {what}"
         if jump > JUMP:
             raise SceneError(f"{said}; let it start from rest, {way}", key)
@@ -295,10 +297,10 @@ def _jumps(scene: Scene, drive: PrescribedMotion, course: Floats, case: str) -> 
             yield said
 
 
-def _clamped(scene: Scene, drive: PrescribedMotion, course: Floats, case: str) -> None:
+def _check_clamped(scene: Scene, drive: PrescribedMotion, history: Floats, case: str) -> None:
     """Refuses motions and forces, in the course (n_times, n_driven, 3), of what is clamped."""
-    size = np.abs(course).max(axis=0)
-    acts = np.broadcast_to(size > ACROSS * size.max(initial=0.0), (len(drive.units), 3))
+    size = np.abs(history).max(axis=0)
+    acts = np.broadcast_to(size > ACROSS_TOLERANCE * size.max(initial=0.0), (len(drive.units), 3))
     if drive.control is not None:
         acts = acts & (drive.control != FREE)
     dofs = (3 * drive.units[:, None] + np.arange(3))[acts]
@@ -311,7 +313,7 @@ def _clamped(scene: Scene, drive: PrescribedMotion, course: Floats, case: str) -
         )
 
 
-def _series(motion: TimeSeries, case: str, end: float) -> None:
+def _check_series(motion: TimeSeries, case: str, end: float) -> None:
     times = np.asarray(motion.times, dtype=float)
     if len(times) != len(motion.motion) or len(times) < 2 or not (np.diff(times) > 0).all():
         raise SceneError(
@@ -328,7 +330,7 @@ def _series(motion: TimeSeries, case: str, end: float) -> None:
         )
 
 
-def _supported(scene: Scene, case: str) -> None:
+def _check_supports(scene: Scene, case: str) -> None:
     """Refuses a static load of a structure that is free to move or turn as a rigid body.
 
     What is driven counts as held.
@@ -345,15 +347,16 @@ def _supported(scene: Scene, case: str) -> None:
         )
 
 
-def _held_back(held: Ints, course: Floats, case: str) -> None:
+def _check_resistance(held: Ints, history: Floats, case: str) -> None:
     """Refuses a static load that nothing resists: all driven units move alike, without a turn.
 
-    `held` are the dofs (n,) that are held besides; `course` (n_times, n_driven, 3).
+    `held` are the dofs (n,) that are held besides; `history` (n_times, n_driven, 3).
     """
-    noise = ACROSS * np.abs(course).max(initial=0.0)  # of the cosine of a direction across
-    alike = (course[..., 2] == 0).all() and (np.abs(course - course[:, :1]) <= noise).all()
-    moves = np.flatnonzero((np.abs(course[..., :2]) > noise).any(axis=(0, 1)))
-    if alike and len(moves) > 0 and not np.isin(held % 3, moves).any():
+    # of the cosine of a direction across
+    noise = ACROSS_TOLERANCE * np.abs(history).max(initial=0.0)
+    uniform = (history[..., 2] == 0).all() and (np.abs(history - history[:, :1]) <= noise).all()
+    moves = np.flatnonzero((np.abs(history[..., :2]) > noise).any(axis=(0, 1)))
+    if uniform and len(moves) > 0 and not np.isin(held % 3, moves).any():
         raise SceneError(
             f"nothing holds the structure against {case}: it moves along as one; clamp some units",
             "supports",

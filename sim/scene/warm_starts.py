@@ -21,7 +21,7 @@ from sim.quasistatics import StaticRecord
 
 log = logging.getLogger(__name__)
 
-_KEPT = ("states", "tangents", "stable", "jumped", "snapped", "eigenvalue")
+_FIELDS_KEPT = ("states", "tangents", "stable", "jumped", "snapped", "eigenvalue")
 """Parts of a record that are stored."""
 
 
@@ -55,14 +55,16 @@ class Paths:
                 old.unlink()
         unfinished = self.folder / f"{name}.new"
         with unfinished.open("wb") as file:
-            parts = {name: np.stack([getattr(one, name) for one in records]) for name in _KEPT}
+            parts = {
+                name: np.stack([getattr(one, name) for one in records]) for name in _FIELDS_KEPT
+            }
             np.savez(file, allow_pickle=False, **parts)
             file.flush()
             os.fsync(file.fileno())
         unfinished.rename(self.folder / name)
 
     def accept(self, evaluation: Evaluation) -> None:
-        """Takes note of an evaluation, computed or read back from the journal."""
+        """Stores the records of an accepted evaluation, computed or read back from the journal."""
         if evaluation.accepted and evaluation.failure is None:
             self._accepted = _name(evaluation.x)
 
@@ -70,7 +72,7 @@ class Paths:
 def _records(path: Path) -> list[StaticRecord]:
     """Reads the records in a file, whose entries have checksums."""
     with np.load(path) as stored:
-        parts = {name: stored[name] for name in _KEPT}
+        parts = {name: stored[name] for name in _FIELDS_KEPT}
     return [
         StaticRecord(
             **{name: part[case] for name, part in parts.items()}, counts=np.zeros(4, dtype=np.int64)

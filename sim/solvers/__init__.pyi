@@ -5,7 +5,7 @@ from .batch import Outcome as Outcome
 from .batch import Solved as Solved
 from .batch import run_batch as run_batch
 from .differentiable import differentiable_motion as differentiable_motion
-from .differentiable import everywhere as everywhere
+from .differentiable import with_full_adjoint as with_full_adjoint
 from .load_cases import Records as Records
 from .load_cases import adjoint_cases as adjoint_cases
 from .load_cases import concrete as concrete
@@ -18,9 +18,9 @@ from .loads import Harmonic as Harmonic
 from .loads import LinearRamp as LinearRamp
 from .loads import MotionLaw as MotionLaw
 from .loads import Pulse as Pulse
+from .loads import Superposition as Superposition
 from .loads import TanhRamp as TanhRamp
 from .loads import TimeSeries as TimeSeries
-from .loads import Together as Together
 from .loads import Turning as Turning
 from .loads import breakpoints as breakpoints
 from .loads import held_dofs as held_dofs

@@ -34,8 +34,8 @@ class CaseMotions(NamedTuple):
     velocity: Array  # (n_cases, n_times, n_units, 3) mm/s, mm/s, rad/s
 
 
-def everywhere(solver: Any) -> Any:
-    """Returns a solver whose adjoint skips no ligament."""
+def with_full_adjoint(solver: Any) -> Any:
+    """Makes the adjoint of a solver cover all ligaments."""
     top = solver.topology
     every = np.arange(len(top.ligament_units))
     if len(top.designed) == len(every):
@@ -68,7 +68,7 @@ def differentiable_motion(
         TypeError: a transform that is not supported.
     """
     try:
-        return _motion(solver if designed else everywhere(solver), parameters, cases)
+        return _motion(solver if designed else with_full_adjoint(solver), parameters, cases)
     except TypeError as error:
         if "jvp" not in str(error):
             raise
@@ -82,10 +82,10 @@ def differentiable_motion(
 def _motion(
     solver: Solver, parameters: Parameters[Any], cases: tuple[PrescribedMotion, ...]
 ) -> CaseMotions:
-    return _solved(solver, parameters, cases)[0]
+    return _solve_all(solver, parameters, cases)[0]
 
 
-def _solved(
+def _solve_all(
     solver: Solver, parameters: Parameters[Any], cases: tuple[PrescribedMotion, ...]
 ) -> tuple[CaseMotions, Records]:
     check_untraced(cases)
@@ -98,7 +98,7 @@ def _forward_rule(
 ) -> tuple[CaseMotions, tuple[Records, bool]]:
     plain = jax.tree.map(lambda primal: primal.value, (parameters, drives), is_leaf=_is_primal)
     driven = any(leaf.perturbed for leaf in jax.tree.leaves(drives, is_leaf=_is_primal))
-    response, records = _solved(solver, *plain)
+    response, records = _solve_all(solver, *plain)
     return response, (records, driven)
 
 
@@ -110,9 +110,9 @@ def _backward_rule(
     solver: Solver, residual: tuple[Records, bool], bar: CaseMotions
 ) -> tuple[Parameters[Array], Any]:
     records, driven = residual
-    bar_u, bar_v = (_dense(part) for part in bar)
-    pulled = adjoint_cases(solver, records, bar_u, bar_v)
-    total = Parameters(*(jnp.asarray(part) for part in pulled.parameters))
+    bar_u, bar_v = (_materialise(part) for part in bar)
+    gradients = adjoint_cases(solver, records, bar_u, bar_v)
+    total = Parameters(*(jnp.asarray(part) for part in gradients.parameters))
     if not driven:
         return total, jax.tree.map(_zero, records.drives)
     held = solver.topology.held
@@ -121,8 +121,8 @@ def _backward_rule(
         _drive_cotangent(
             held,
             drive,
-            (pulled.times[case], solver.output_times),
-            (pulled.drive[case], held_u[case], held_v[case]),
+            (gradients.times[case], solver.output_times),
+            (gradients.drive[case], held_u[case], held_v[case]),
         )
         for case, drive in enumerate(records.drives)
     )
@@ -131,7 +131,7 @@ def _backward_rule(
 _motion.defvjp(_forward_rule, _backward_rule, symbolic_zeros=True)
 
 
-def _dense(cotangent: Any) -> Floats:
+def _materialise(cotangent: Any) -> Floats:
     if isinstance(cotangent, SymbolicZero):
         return np.zeros(cotangent.shape)
     check_untraced(cotangent)
@@ -176,8 +176,8 @@ def _pull_back(
     within, outputs = times
 
     def prescribed(law: MotionLaw) -> tuple[Numbers, ...]:
-        followed = (law(within), law(outputs), rates_of(law, outputs))
-        return tuple(selected(selection, each) for each in followed)
+        values_and_rates = (law(within), law(outputs), rates_of(law, outputs))
+        return tuple(selected(selection, each) for each in values_and_rates)
 
     _, pull_back = jax.vjp(prescribed, motion)
     return cast(MotionLaw, pull_back(bars)[0])

@@ -101,10 +101,10 @@ def solve_cases(
         SimulationError: a step failed.
     """
     each = (
-        _of_one_case(one, solver.threads, len(drives)) for one in solvers or [solver] * len(drives)
+        _case_solver(one, solver.threads, len(drives)) for one in solvers or [solver] * len(drives)
     )
     jobs = list(zip(each, drives, strict=True))
-    results = _spread(lambda job: solve_case(job[0], values, job[1]), jobs, solver.threads)
+    results = _map_cases(lambda job: solve_case(job[0], values, job[1]), jobs, solver.threads)
     shape = (len(drives), -1, solver.topology.n_units, 3)
     displacement = np.stack([u for u, _, _ in results]).reshape(shape)
     velocity = np.stack([v for _, v, _ in results]).reshape(shape)
@@ -114,8 +114,8 @@ def solve_cases(
 def adjoint_cases(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats) -> Gradients:
     """Sweeps back through ``solve_cases``, from loss derivatives shaped as its outputs."""
     flat_u, flat_v = (with_loads(solver.topology, bar) for bar in (bar_u, bar_v))
-    alone = _of_one_case(solver, solver.threads, len(flat_u))
-    results = _spread(
+    alone = _case_solver(solver, solver.threads, len(flat_u))
+    results = _map_cases(
         lambda case: _sweep_back(
             alone, records.values, records.records[case], flat_u[case], flat_v[case]
         ),
@@ -148,12 +148,12 @@ def with_loads(topology: Topology, bar: Floats) -> Floats:
     return np.pad(flat, ((0, 0), (0, 0), (0, 3 * len(topology.loaded))))
 
 
-def _of_one_case(solver: Any, threads: int, n_cases: int) -> Solver:
+def _case_solver(solver: Any, threads: int, n_cases: int) -> Solver:
     """Returns a solver of one case of many, with the threads that are left to each."""
     return replace(solver, threads=max(1, threads // max(1, n_cases)))
 
 
-def _spread(work: Callable[[T], R], items: Sequence[T], threads: int) -> list[R]:
+def _map_cases(work: Callable[[T], R], items: Sequence[T], threads: int) -> list[R]:
     """Maps over cases on threads, in order; compiled loops run without the interpreter's lock."""
     if threads == 1 or len(items) == 1:
         return [work(item) for item in items]

@@ -46,11 +46,11 @@ class Turning(NamedTuple):
     Of a force, in N, it makes a moment, in N mm.
     """
 
-    course: MotionLaw
+    history: MotionLaw
 
     def __call__(self, times: Numbers) -> Numbers:
         """Computes the motion (n_times, 3) at the given times, s."""
-        xp, along = times.__array_namespace__(), self.course(times)[:, 0]
+        xp, along = times.__array_namespace__(), self.history(times)[:, 0]
         still = xp.zeros_like(along)
         return xp.stack([still, still, along], axis=-1)
 
@@ -122,7 +122,7 @@ class LinearRamp(NamedTuple):
         return _along(self.direction, self.amplitude * times / self.duration)
 
 
-class Together(NamedTuple):
+class Superposition(NamedTuple):
     """Moves each driven unit by a sum of motions."""
 
     motions: tuple[MotionLaw, ...]  # (n_motions,) of one course for all units each
@@ -161,10 +161,10 @@ def breakpoints(motion: MotionLaw, end: float) -> Floats:
     A bell or a switch, whose extent is infinite, counts as eight widths long.
     """
     match motion:
-        case Together():
+        case Superposition():
             found = np.concatenate([breakpoints(one, end) for one in motion.motions])
         case Turning():
-            found = breakpoints(motion.course, end)
+            found = breakpoints(motion.history, end)
         case Pulse():
             found = motion.delay + motion.width * np.arange(-4.0, 5.0)
         case Harmonic(rise=float(rise)):
@@ -215,10 +215,10 @@ def _peaks(series: TimeSeries, start: float, end: float) -> Floats:
 def single_motions(motion: MotionLaw) -> tuple[MotionLaw, ...]:
     """Lists the motions that one is made of."""
     match motion:
-        case Together():
+        case Superposition():
             return tuple(one for each in motion.motions for one in single_motions(each))
         case Turning():
-            return single_motions(motion.course)
+            return single_motions(motion.history)
         case _:
             return (motion,)
 
@@ -243,7 +243,7 @@ def held_values(held: Ints, driven: Ints, motion: Numbers, control: Ints | None 
 
 
 def held_selection(held: Ints, driven: Ints, control: Ints | None = None) -> Floats:
-    """Tells by ones which held dof (n_held) each component of the driven units (3 n_driven) is.
+    """Builds the selection (n_held, 3 n_driven) of held dofs by components of the driven units.
 
     Raises:
         ValueError: a driven dof is not among the held ones, or a unit is driven twice.

@@ -14,7 +14,7 @@ from sim.solvers.loads import (
     DISPLACEMENT,
     FORCE,
     MotionLaw,
-    Together,
+    Superposition,
     held_selection,
     loaded_units,
     selected,
@@ -44,7 +44,7 @@ class PrescribedMotion(NamedTuple):
     @property
     def leading(self) -> Ints:
         """(n_leading,) units whose force is the drive's: of motions together the first one's."""
-        if not isinstance(self.motion, Together):
+        if not isinstance(self.motion, Superposition):
             return self.units
         return self.units[np.asarray(self.motion.shares)[:, 0] != 0.0]
 

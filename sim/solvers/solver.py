@@ -1,4 +1,4 @@
-"""Says what a solver of one load case offers.
+"""Defines the interface of a solver of one load case.
 
 There are ``StaticSolver`` (equilibria), ``ImplicitSolver`` (slow drives) and ``ExplicitSolver``
 (waves, tight tolerances).

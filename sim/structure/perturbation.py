@@ -157,7 +157,7 @@ def _assembled(
     deviation = np.array([spread[0], *spread])
     pose = deviation * random.standard_normal((lattice.n_units, 3))
     for _ in range(MOST_ROUNDS):
-        placed = _placed(lattice, copy.vertices, pose)
+        placed = _move_units(lattice, copy.vertices, pose)
         clashing = clashing_units(lattice, placed, contact)
         if len(clashing) == 0:
             return replace(copy, vertices=placed)
@@ -165,7 +165,7 @@ def _assembled(
     return replace(copy, vertices=placed, sound=False)
 
 
-def _placed(lattice: Lattice, vertices: Floats, pose: Floats) -> Floats:
+def _move_units(lattice: Lattice, vertices: Floats, pose: Floats) -> Floats:
     """Moves units by a pose (n_units, 3) each, mm and rad; returns their vertices."""
     middle = np.add.reduceat(vertices, lattice.first_vertex[:-1])
     middle /= np.diff(lattice.first_vertex)[:, None]

@@ -105,7 +105,7 @@ static int solve(
 }
 
 /* Notes a stage's displacement, v = (u - u*) / k and a = (v - v*) / k. */
-static void note(
+static void record_stage(
     int64_t s, const double *motion, const Base *base, int64_t n_dofs, const Step *step) {
     double *u = step->u + s * n_dofs, *v = step->v + s * n_dofs, *a = step->a + s * n_dofs;
     EACH(d, n_dofs) {
@@ -139,7 +139,7 @@ void esdirk_march(
             status = solve(
                 s, &method, &step, target, &base, tolerance * step.h, system, work, &contraction,
                 motion, counts);
-            if (status == CONVERGED) note(s, motion, &base, n_dofs, &step);
+            if (status == CONVERGED) record_stage(s, motion, &base, n_dofs, &step);
         }
         if (status != CONVERGED) {
             worst = worst_of(system, work->step);

@@ -83,7 +83,7 @@ static Move newton_step(
 }
 
 /* Ends a stage that failed: nothing of it is of use to the next. */
-static int given_up(int status, Contraction *contraction) {
+static int give_up(int status, Contraction *contraction) {
     *contraction = (Contraction){false, 1.0};
     return status;
 }
@@ -100,9 +100,9 @@ int esdirk_stage_solve(
         if (!fresh) {
             factors++;
             counts[1]++;
-            if (factors > MAX_FACTORS) return given_up(STALLED, contraction);
+            if (factors > MAX_FACTORS) return give_up(STALLED, contraction);
             if (!esdirk_stage_factorise(motion, system, work, base->k))
-                return given_up(INDEFINITE, contraction);
+                return give_up(INDEFINITE, contraction);
             fresh = true, previous = 0.0, rate = least(rate, NEW_RATE);
         }
         Move move = newton_step(motion, target, base, system, work);
@@ -111,7 +111,7 @@ int esdirk_stage_solve(
         double allowed = KEEP_FROM_BARRIER * total_admissible_step(motion, system, work->step);
         double part = least(1.0, allowed);
         EACH(d, system->n_mass) motion[d] += part * work->step[d];
-        if (!(size < 1e6)) return given_up(STALLED, contraction);
+        if (!(size < 1e6)) return give_up(STALLED, contraction);
         if (allowed < 1.0) {
             fresh = false;
             continue;

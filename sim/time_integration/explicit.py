@@ -18,13 +18,13 @@ from sim.time_integration.symplectic import Outputs, Steps, run, sweep_back
 from sim.vibration import highest_frequency
 
 MAX_REFINEMENTS = 4
-KEEP_FROM_LIMIT = 0.95
-FINER = 0.1
+LIMIT_MARGIN = 0.95
+BARRIER_STEP = 0.1
 """Finer steps at a barrier, in shares of the stability limit."""
-RUNG = 1.25
+STEP_RATIO = 1.25
 MOST_MEMORY = 2 << 30
 """Bytes that the drive's values at all kicks may take: some hundred million kicks of a unit."""
-MOVING = 1.5
+FREQUENCY_GROWTH = 1.5
 """Highest eigenfrequency in motion over that at rest, as expected before the first run."""
 NONE = np.zeros(0, dtype=np.int64)
 
@@ -73,14 +73,21 @@ class ExplicitSolver:
         system = system_of(top, values, NONE)
         check_masses(values)
         check_start(top, values, system.contacts, drive.start(top, 0.0))
-        stable = self._steps_for(MOVING * highest_frequency(top, values, touching=NONE))
+        stable = self._steps_for(FREQUENCY_GROWTH * highest_frequency(top, values, touching=NONE))
         for _ in range(MAX_REFINEMENTS):
             steps = self._steps(system, drive, stable)
             checkpoints = np.empty((-(-steps.n_steps // steps.segment), 2, top.n_dofs))
             u, v = (np.zeros((len(self.output_times), top.n_dofs)) for _ in range(2))
             outputs = self._outputs(steps.n_steps)
             failed = run(
-                steps, outputs, system, workspace(system), self._watched, checkpoints, u, v
+                steps,
+                outputs,
+                system,
+                workspace(system),
+                self._contact_ligaments,
+                checkpoints,
+                u,
+                v,
             )
             raise_new_pairs(system.contacts)
             needed = 2 * stable if failed >= 0 else self._steps_in_motion(values, u, stable)
@@ -102,10 +109,10 @@ class ExplicitSolver:
 
         Rungs keep the grid from following every change of a design: the loss would jump.
         """
-        limit = KEEP_FROM_LIMIT * self.splitting.stability
+        limit = LIMIT_MARGIN * self.splitting.stability
         needed = self.duration * frequency / limit
-        rung = np.ceil(np.log(max(needed / self.n_steps, 1.0)) / np.log(RUNG))
-        return int(np.ceil(self.n_steps * RUNG**rung))
+        rung = np.ceil(np.log(max(needed / self.n_steps, 1.0)) / np.log(STEP_RATIO))
+        return int(np.ceil(self.n_steps * STEP_RATIO**rung))
 
     def _steps_in_motion(self, values: ConcreteParameters, states: Floats, taken: int) -> int:
         """Counts the steps that are stable in the one of the states whose energy is greatest.
@@ -124,7 +131,7 @@ class ExplicitSolver:
         return self._steps_for(highest_frequency(self.topology, values, fullest, NONE))
 
     @property
-    def _watched(self) -> Ints:
+    def _contact_ligaments(self) -> Ints:
         """Ligaments whose voids may come to contact."""
         by_angle = isinstance(self.topology.contact, VoidAngleContact)
         return np.arange(len(self.topology.ligament_units)) if by_angle else NONE
@@ -139,8 +146,8 @@ class ExplicitSolver:
         bar_decay, bar_gain = np.zeros_like(steps.decay), np.zeros_like(steps.gain)
         outputs = self._outputs(steps.n_steps)
         sweep_back(
-            steps, outputs, system, workspace(system), self._watched, record.checkpoints, bar_u,
-            bar_v, top.designed, bars, bar_decay, bar_gain,
+            steps, outputs, system, workspace(system), self._contact_ligaments, record.checkpoints,
+            bar_u, bar_v, top.designed, bars, bar_decay, bar_gain,
         )  # fmt: skip
         raise_new_pairs(system.contacts)
         lengths = self.splitting.kicks * steps.h
@@ -163,7 +170,9 @@ class ExplicitSolver:
         return Steps(
             n_steps,
             h,
-            Substeps(self.splitting.drifts, self.splitting.kicks, FINER * self.splitting.stability),
+            Substeps(
+                self.splitting.drifts, self.splitting.kicks, BARRIER_STEP * self.splitting.stability
+            ),
             *_kicks(system, self.splitting.kicks * h),
             held.reshape(n_steps, n_kicks, -1),
             _segment(n_steps),
@@ -172,8 +181,8 @@ class ExplicitSolver:
     def _kick_times(self, n_steps: int) -> Floats:
         """Times (n_steps n_kicks,) at which forces are evaluated."""
         h = self.duration / n_steps
-        within = np.cumsum(self.splitting.drifts[:-1])
-        return np.asarray((h * (np.arange(n_steps)[:, None] + within)).ravel())
+        fractions = np.cumsum(self.splitting.drifts[:-1])
+        return np.asarray((h * (np.arange(n_steps)[:, None] + fractions)).ravel())
 
     def _outputs(self, n_steps: int) -> Outputs:
         times = np.linspace(0, self.duration, n_steps + 1)
@@ -181,7 +190,7 @@ class ExplicitSolver:
 
 
 def _failure(failed: int, n_steps: int, needed: int) -> SimulationError:
-    """Says what stopped the last run: a step `failed` of its `n_steps`, or none (-1)."""
+    """Explains the end of the last run: a step `failed` of its `n_steps`, or none (-1)."""
     remedy = "try a smaller drive or a larger smallest edge"
     if failed < 0:
         return SimulationError(

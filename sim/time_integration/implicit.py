@@ -75,7 +75,7 @@ class ImplicitSolver:
         """See ``Solver``."""
         time_grid.check_output_times(self.output_times, float(self.times[-1]))
         record = self._march(values, drive, self.touching(values), self.times)
-        if self._untouched_voids_close(values, record):
+        if self._skipped_contact_closes(values, record):
             record = self._march(values, drive, np.arange(len(values.void)), self.times)
         for _ in range(MAX_SPLITS):
             value, slope = time_grid.hermite_matrices(record.times, self.output_times)
@@ -92,7 +92,7 @@ class ImplicitSolver:
             " more output times, a smaller drive or accuracy: tight"
         )
 
-    def _untouched_voids_close(self, values: ConcreteParameters, record: ImplicitRecord) -> bool:
+    def _skipped_contact_closes(self, values: ConcreteParameters, record: ImplicitRecord) -> bool:
         """Tests if a void whose contact was skipped came to the cutoff in any stage."""
         law = self.topology.contact
         if not isinstance(law, VoidAngleContact):
@@ -124,7 +124,7 @@ class ImplicitSolver:
                 return ImplicitRecord(times, u, v, a, touching, counts, top)
             last = len(times) - 1 if attempt % PATIENCE == 0 else step + 1
             times = time_grid.split_steps(times, np.arange(step, last))
-            u, v, a = (_kept(stages, step, len(times)) for stages in (u, v, a))
+            u, v, a = (_extended(stages, step, len(times)) for stages in (u, v, a))
         raise SimulationError(
             f"the step at t = {times[step]:.6g} s failed after {MAX_SPLITS} cuts, worst at unit"
             f" {worst // 3} (the tangent is indefinite or a contact jams); try a smaller drive or"
@@ -164,7 +164,7 @@ class ImplicitSolver:
         return as_values(bars, top.n_units), stage_times, bars.drive
 
 
-def _kept(stages: Floats, step: int, n_times: int) -> Floats:
+def _extended(stages: Floats, step: int, n_times: int) -> Floats:
     """Makes room for more times, with the values of the steps before ``step`` and at its start."""
     kept = np.zeros((n_times, *stages.shape[1:]))
     kept[: step + 1] = stages[: step + 1]

@@ -15,7 +15,7 @@ from sim.time_integration.esdirk_stage import CONVERGED
 from sim.time_integration.implicit import ImplicitSolver
 
 SAFETY, SHRINK, GROW = 0.85, 0.2, 3.0
-NOWHERE = np.zeros(0)
+NO_STOPS = np.zeros(0)
 
 
 def adapted(
@@ -25,7 +25,7 @@ def adapted(
     tolerance: float,
     first: float = 1e-4,
     largest: float = np.inf,
-    stops: Floats = NOWHERE,
+    stops: Floats = NO_STOPS,
     most: float = np.inf,
 ) -> ImplicitSolver:
     """Adapts the grid until every step's error estimate stays below ``tolerance``, mm.
@@ -57,7 +57,7 @@ def _adapted(
     most: float,
 ) -> ImplicitSolver:
     end = float(solver.times[-1])
-    ends = time_grid.through(np.array([0.0, end]), stops)[1:]
+    ends = time_grid.insert_times(np.array([0.0, end]), stops)[1:]
     times, state = [0.0], (np.zeros(solver.topology.n_dofs), np.zeros(solver.topology.n_dofs))
     step = min(first, end)
     while times[-1] < end * (1 - 1e-12):

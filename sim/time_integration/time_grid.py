@@ -36,7 +36,7 @@ def divided(times: Floats, parts: int) -> Floats:
     return np.interp(np.arange(parts * (len(times) - 1) + 1) / parts, steps, times)
 
 
-def through(times: Floats, stops: Floats) -> Floats:
+def insert_times(times: Floats, stops: Floats) -> Floats:
     """Adds times (n,) that a grid has to meet; points NEAR to the one before are left out."""
     every = np.union1d(times, stops)
     kept = every[np.append(True, np.diff(every) > NEAR * every[-1])]

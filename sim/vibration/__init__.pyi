@@ -5,8 +5,8 @@ from .bloch import cell_of as cell_of
 from .bloch import strained as strained
 from .extreme_frequencies import highest_frequency as highest_frequency
 from .extreme_frequencies import lowest_frequency as lowest_frequency
+from .linearisation import FullTangent as FullTangent
 from .linearisation import Linear as Linear
-from .linearisation import WholeTangent as WholeTangent
 from .linearisation import linearised as linearised
 from .linearisation import modes as modes
 from .linearisation import transmission as transmission

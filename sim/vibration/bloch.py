@@ -27,9 +27,9 @@ TOLERANCE = 1e-10
 STEPS, MAX_NEWTON = 20, 40
 LONGEST_PERIOD = 6
 """That is tried of a lattice that does not repeat after the one asked for, steps."""
-CRUSHED = 0.5
+LARGEST_COMPRESSION = 0.5
 """Change of a ligament's length, as a share of it, from which on its law means nothing."""
-RIGHT = 1e-9
+LATTICE_TOLERANCE = 1e-9
 """Cosine of periods that counts as that of a right angle, and rounding of equal lengths."""
 
 
@@ -206,7 +206,7 @@ def strained(cell: UnitCell, gradient: Floats, free: Floats) -> StrainedCell:
     found = np.array(np.ravel(gradient), dtype=float)
     found[loose] = state[3 * cell.n_units :]
     made = StrainedCell(state[: 3 * cell.n_units].reshape(-1, 3), found.reshape(2, 2))
-    if (worst := _crushed(cell, made)) > CRUSHED:
+    if (worst := _largest_compression(cell, made)) > LARGEST_COMPRESSION:
         raise SimulationError(
             f"a ligament of the unit cell would change its length by {worst:.0%}; try a smaller"
             " strain"
@@ -214,7 +214,7 @@ def strained(cell: UnitCell, gradient: Floats, free: Floats) -> StrainedCell:
     return made
 
 
-def _crushed(cell: UnitCell, at: StrainedCell) -> float:
+def _largest_compression(cell: UnitCell, at: StrainedCell) -> float:
     """Finds the largest change of length of a ligament, as a share of it."""
     ends = zip(_pairs(cell, at), cell.arm, cell.vector, strict=True)
     return max(
@@ -233,7 +233,7 @@ def _pairs(cell: UnitCell, at: StrainedCell) -> Floats:
 
 def _admissible(energy: Callable[[Floats, Array], Array], state: Floats, change: Floats,
                 asked: Array) -> Floats:  # fmt: skip
-    """Takes as much of a change as leaves every void open."""
+    """Scales a change so that every void stays open."""
     for halving in range(30):
         moved = state + change / 2**halving
         if np.isfinite(energy(moved, asked)):
@@ -318,12 +318,12 @@ def _side_and_corner(reciprocal: Floats) -> tuple[Floats, Floats]:
     The `reciprocal` vectors (2, 2) span the reciprocal lattice.
     """
     one, other = reciprocal
-    if abs(one @ other) <= RIGHT * np.linalg.norm(one) * np.linalg.norm(other):
+    if abs(one @ other) <= LATTICE_TOLERANCE * np.linalg.norm(one) * np.linalg.norm(other):
         return one, (one + other) / 2
     while True:  # to the shortest vectors (Gauss), across the sides of the zone
-        if other @ other < one @ one * (1 - RIGHT):
+        if other @ other < one @ one * (1 - LATTICE_TOLERANCE):
             one, other = other, one
-        if not (turns := np.rint(one @ other / (one @ one) * (1 - RIGHT))):
+        if not (turns := np.rint(one @ other / (one @ one) * (1 - LATTICE_TOLERANCE))):
             break
         other = other - turns * one
     # as far from the origin as from two neighbours at an acute angle

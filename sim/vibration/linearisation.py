@@ -48,7 +48,7 @@ class Modes(NamedTuple):
         return np.asarray(np.sign(self.square) * np.sqrt(np.abs(self.square)) / (2 * np.pi))
 
 
-class _Part(NamedTuple):
+class _SubmatrixPattern(NamedTuple):
     """Holds where the entries of a part of a tangent come from, as long as no others appear."""
 
     rows: Ints
@@ -58,8 +58,8 @@ class _Part(NamedTuple):
     entry_row: Ints  # (n_entries,) row of each
     first: Ints  # (n_columns + 1,) first entry of each column
 
-    def serves(self, rows: Ints, columns: Ints, occupied: Ints) -> bool:
-        """Tells whether the part is the same, and its pattern."""
+    def matches(self, rows: Ints, columns: Ints, occupied: Ints) -> bool:
+        """Tests whether the part is the same, and its pattern."""
         return (
             np.array_equal(self.rows, rows)
             and np.array_equal(self.columns, columns)
@@ -67,18 +67,18 @@ class _Part(NamedTuple):
         )
 
 
-class WholeTangent:
+class FullTangent:
     """Evaluates a structure's tangent among all dofs, held ones included, state by state."""
 
     def __init__(self, topology: Topology, values: ConcreteParameters) -> None:
         none = np.zeros(0, dtype=np.int64)
-        whole = replace(topology.unloaded, held=none, storages=("band",))
-        self._place, pattern = whole.numbering
-        self._system = system_of(whole, values)
+        full = replace(topology.unloaded, held=none, storages=("band",))
+        self._place, pattern = full.numbering
+        self._system = system_of(full, values)
         self._matrix, self._kinematics = matrix(pattern), kinematics_of(self._system)
-        self._part: _Part | None = None
+        self._pattern: _SubmatrixPattern | None = None
 
-    def among(self, rows: Ints, columns: Ints, state: Floats) -> sp.csc_array:
+    def submatrix(self, rows: Ints, columns: Ints, state: Floats) -> sp.csc_array:
         """Assembles the part (n_rows, n_columns) of some dofs at a state (n_dofs,).
 
         Raises:
@@ -90,13 +90,15 @@ class WholeTangent:
         tangent(state, self._system, self._kinematics, made)
         raise_new_pairs(self._system.contacts)
         occupied = np.flatnonzero(made.values)
-        if self._part is None or not self._part.serves(rows, columns, occupied):
-            self._part = self._part_of(rows, columns, occupied)
-        part = self._part
+        if self._pattern is None or not self._pattern.matches(rows, columns, occupied):
+            self._pattern = self._find_pattern(rows, columns, occupied)
+        pattern = self._pattern
         shape = len(rows), len(columns)
-        return sp.csc_array((made.values[part.source], part.entry_row, part.first), shape=shape)
+        return sp.csc_array(
+            (made.values[pattern.source], pattern.entry_row, pattern.first), shape=shape
+        )
 
-    def _part_of(self, rows: Ints, columns: Ints, occupied: Ints) -> _Part:
+    def _find_pattern(self, rows: Ints, columns: Ints, occupied: Ints) -> _SubmatrixPattern:
         """Finds where the entries of a part lie among the bands."""
         n, width = self._system.pattern.size
         column, below = np.divmod(occupied, width + 1)
@@ -110,7 +112,9 @@ class WholeTangent:
         )
         found = sp.csc_array(full[self._place[rows]][:, self._place[columns]])
         found.sort_indices()
-        return _Part(rows, columns, occupied, found.data - 1, found.indices, found.indptr)
+        return _SubmatrixPattern(
+            rows, columns, occupied, found.data - 1, found.indices, found.indptr
+        )
 
 
 def linearised(
@@ -124,12 +128,12 @@ def linearised(
 
 
 def _linearised(topology: Topology, values: ConcreteParameters, motion: Floats | None) -> Linear:
-    whole = WholeTangent(topology, values)
+    full = FullTangent(topology, values)
     state = np.zeros(topology.n_dofs) if motion is None else np.array(motion, dtype=float).ravel()
     free = np.setdiff1d(np.arange(topology.n_dofs), topology.held)
     return Linear(
-        stiffness=whole.among(free, free, state),
-        coupling=whole.among(free, topology.held, state),
+        stiffness=full.submatrix(free, free, state),
+        coupling=full.submatrix(free, topology.held, state),
         mass=np.asarray(values.mass).ravel()[free],
         damping=np.asarray(values.damping).ravel()[free],
         free=free,

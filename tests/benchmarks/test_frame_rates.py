@@ -31,5 +31,5 @@ def test_the_first_frame_is_timed_apart(method: str, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("time.process_time", count().__next__)
     video: Any = SimpleNamespace(specimen=None, scale=1.0)
     frames: list[Frame] = FRAMES
-    found = frame_rates.followed(video, frames, method)
+    found = frame_rates.track_timed(video, frames, method)
     assert (found.first, found.each) == (1, 5 / 4)  # four frames, and what follows the last

@@ -186,9 +186,9 @@ def test_mistakes(arguments: list[str], message: str, capsys: pytest.CaptureFixt
 def test_more_than_15_percent_is_told(seconds: float, error: float, lines: list[str]) -> None:
     before = recorded(1.0, 1e-3, yard=0.5)
     # the second machine is half as fast: its seconds are twice as many
-    assert comparison.worse(recorded(seconds, error, yard=1.0), before) == lines
+    assert comparison.find_regressions(recorded(seconds, error, yard=1.0), before) == lines
     rounding = recorded(1.0, 1e-14, 1.0), recorded(1.0, 1e-16, 1.0)
-    assert comparison.worse(*rounding) == []
+    assert comparison.find_regressions(*rounding) == []
 
 
 def test_figures_that_are_gone_are_told() -> None:
@@ -196,14 +196,14 @@ def test_figures_that_are_gone_are_told() -> None:
     before = comparison.record([fine, Measurement("long", cpu_s=(9.0,))], ABOUT, 1.0)
     lost = comparison.record([replace(fine, errors={"loss": np.nan})], ABOUT, 1.0)
     assert json.loads(json.dumps(lost, allow_nan=False)) == lost
-    assert comparison.worse(lost, before, skipped=("long",)) == [
+    assert comparison.find_regressions(lost, before, skipped=("long",)) == [
         "fine: loss has no figure any more",
         "fine: gradient has no figure any more",
     ]
-    assert comparison.worse(before, lost) == []
+    assert comparison.find_regressions(before, lost) == []
     failed = comparison.record([replace(fine, cpu_s=(), failure="no equilibrium")], ABOUT, 1.0)
     gone = [f"{name}: no figures any more" for name in ("fine", "long")]
-    assert comparison.worse(failed, before) == gone
+    assert comparison.find_regressions(failed, before) == gone
 
 
 def test_an_energy_that_is_no_number_meets_no_target() -> None:
@@ -224,8 +224,8 @@ def recorded(seconds: float, error: float, yard: float) -> comparison.Record:
 def test_a_record_is_kept_with_machine_and_commit(tmp_path: Path) -> None:
     path, made = tmp_path / "kept.json", recorded(1.0, 1e-3, yard=0.5)
     assert 1e-4 < comparison.yardstick() < 10
-    assert "nothing stored" in comparison.compared("toy", made, path)
+    assert "nothing stored" in comparison.comparison_text("toy", made, path)
     comparison.keep("toy", made, path)
-    assert comparison.stored(path) == {"toy": made}
+    assert comparison.read_records(path) == {"toy": made}
     assert made["candidates"] == {"coarse": {"time": 2.0, "errors": {"loss": 1e-3}}}
-    assert "abacus, commit 0123456789" in comparison.compared("toy", made, path)
+    assert "abacus, commit 0123456789" in comparison.comparison_text("toy", made, path)

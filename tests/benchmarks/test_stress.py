@@ -17,10 +17,10 @@ from benchmarks.stress import (
     StressFamily,
     StressScene,
     Tally,
-    attempted,
     balance,
     checks,
     pressed,
+    run_attempt,
     shaken,
     squares,
     stiffness,
@@ -45,7 +45,7 @@ def refused(message: str) -> list[Check]:
 
 
 @pytest.mark.parametrize(
-    ("attempt", "wanted", "verdict"),
+    ("attempt", "expected", "verdict"),
     [
         (lambda: found(1.0), "solution", "solved"),
         (lambda: found(1.1), "solution", "wrong"),
@@ -57,8 +57,8 @@ def refused(message: str) -> list[Check]:
         (lambda: refused("there is none; try another"), "refusal", "refused"),
     ],
 )
-def test_verdicts(attempt: Callable[[], list[Check]], wanted: Any, verdict: str) -> None:  # noqa: ANN401
-    assert attempted(StressCase("toy", attempt, wanted)).verdict == verdict
+def test_verdicts(attempt: Callable[[], list[Check]], expected: Any, verdict: str) -> None:  # noqa: ANN401
+    assert run_attempt(StressCase("toy", attempt, expected)).verdict == verdict
 
 
 def test_only_what_a_study_may_ask_for_counts_as_in_range() -> None:
@@ -70,13 +70,13 @@ def test_only_what_a_study_may_ask_for_counts_as_in_range() -> None:
         StressCase("rightly", lambda: refused("no; try another"), "refusal"),
         StressCase("either", lambda: refused("no; try another"), "either"),
     ]
-    tally = Tally(family, tuple(attempted(case) for case in cases))
+    tally = Tally(family, tuple(run_attempt(case) for case in cases))
     assert tally.in_range == (3, 2)
     assert tally.counts == {"solved": 2, "refused": 3}
     assert tally.worst == found(0.5)
     beyond = [[Check("beyond, deg", value, 0.0)] for value in (-2.0, -0.5, -1.0)]
     cases = [StressCase("toy", lambda made=made: made) for made in beyond]  # type: ignore[misc]
-    assert Tally(family, tuple(map(attempted, cases))).worst == beyond[1]
+    assert Tally(family, tuple(map(run_attempt, cases))).worst == beyond[1]
 
 
 def values_of(made: list[Check]) -> dict[str, Check]:
@@ -104,22 +104,22 @@ def test_the_definition_has_the_derivatives_of_its_energy(plate: StressScene) ->
 
 def test_equilibria_off_balance_and_units_in_one_another_are_found(plate: StressScene) -> None:
     answer = checks.solved(plate, StaticSolver(plate.topology, np.ones(1)))
-    assert all(check.kept for check in checks.balanced(plate, answer))
-    assert all(check.kept for check in checks.admissible(plate, answer.displacement))
+    assert all(check.within_limit for check in checks.check_balance(plate, answer))
+    assert all(check.within_limit for check in checks.check_admissible(plate, answer.displacement))
     free = plate.topology.free_dofs
     moved = answer.displacement.copy()
     moved[0, free[0]] += 1e-4
-    away = values_of(checks.balanced(plate, answer._replace(displacement=moved)))
-    assert not away["distance from balance, mm/mm"].kept
+    away = values_of(checks.check_balance(plate, answer._replace(displacement=moved)))
+    assert not away["distance from balance, mm/mm"].within_limit
     middle = 3 * 4 + 2
-    kept = []
+    within = []
     for turn in (2.0, -2.0):  # one of which closes the narrower voids around the unit
         turned = answer.displacement.copy()
         turned[0, middle] += turn
-        kept += [check.kept for check in checks.admissible(plate, turned)]
-    assert not all(kept)
+        within += [check.within_limit for check in checks.check_admissible(plate, turned)]
+    assert not all(within)
     moved[0, middle] = np.nan
-    assert not all(check.kept for check in checks.admissible(plate, moved))
+    assert not all(check.within_limit for check in checks.check_admissible(plate, moved))
 
 
 def test_saddles_and_stages_off_balance_are_found() -> None:
@@ -128,18 +128,18 @@ def test_saddles_and_stages_off_balance_are_found() -> None:
     straight = np.zeros((1, chain.topology.n_dofs))
     straight[0, ::3] = -0.04 * 9 * 15.0 * np.arange(9) / 8
     answer = checks.solved(chain, StaticSolver(chain.topology, np.ones(1)))
-    made = values_of(checks.balanced(chain, answer._replace(displacement=straight)))
-    assert made["distance from balance, mm/mm"].kept
-    assert not made["falling directions of an equilibrium"].kept
+    made = values_of(checks.check_balance(chain, answer._replace(displacement=straight)))
+    assert made["distance from balance, mm/mm"].within_limit
+    assert not made["falling directions of an equilibrium"].within_limit
     case = shaken(squares(3), Harmonic(1.0, 30.0), duration=0.01, frequency=30.0)
     times = np.linspace(0.0, 0.01, 11)
     solver = ImplicitSolver(case.topology, times, times)
     record = checks.solved(case, solver).record
     assert isinstance(record, ImplicitRecord)
-    assert all(check.kept for check in checks.stages(case, solver, record))
+    assert all(check.within_limit for check in checks.stages(case, solver, record))
     for spoilt in (1.1 * record.a[3], np.nan):
         record.a[3] = spoilt
-        assert not all(check.kept for check in checks.stages(case, solver, record))
+        assert not all(check.within_limit for check in checks.stages(case, solver, record))
 
 
 def test_a_distance_that_is_no_number_is_not_kept(
@@ -148,7 +148,9 @@ def test_a_distance_that_is_no_number_is_not_kept(
     answer = checks.solved(plate, StaticSolver(plate.topology, np.ones(1)))
     lost = balance(plate.structure, answer.displacement[0])._replace(force=np.full(27, np.nan))
     monkeypatch.setattr(checks, "balance", lambda *_: lost)
-    assert not values_of(checks.balanced(plate, answer))["distance from balance, mm/mm"].kept
+    assert not values_of(checks.check_balance(plate, answer))[
+        "distance from balance, mm/mm"
+    ].within_limit
 
 
 def test_drawn_designs_can_be_made_and_reach_their_bounds() -> None:
@@ -201,7 +203,7 @@ def test_units_without_a_ligament_are_refused_by_every_solver() -> None:
     alone = [case for case in pieces.cases(False) if "no ligament" in case.name]
     assert len(alone) == 3
     for case in alone:
-        outcome = attempted(case)
+        outcome = run_attempt(case)
         assert outcome.verdict == "refused"
         assert "no two units are joined" in outcome.message
 
@@ -209,7 +211,7 @@ def test_units_without_a_ligament_are_refused_by_every_solver() -> None:
 def test_stages_settle_that_contract_fast_at_first_and_slowly_then() -> None:
     name = "axial stiffness times 1e+01, shaken at 60 Hz"
     stiff = [case for case in constants.cases(False) if case.name == name]
-    assert [attempted(case).verdict for case in stiff] == ["solved"]
+    assert [run_attempt(case).verdict for case in stiff] == ["solved"]
 
 
 def test_counts_of_a_part_do_not_replace_those_of_all(

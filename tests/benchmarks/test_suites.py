@@ -66,7 +66,7 @@ def test_a_design_with_a_clearance_that_is_no_number_is_not_the_best() -> None:
         n_variables=2,
         constraints=lambda _: (np.array([np.nan, 1.0]), np.eye(2)),
     )
-    course = suites.optimiser_contest.judged(asked, lambda _: (1.0, np.ones(2), np.zeros(2)))
+    course = suites.optimiser_contest.judge(asked, lambda _: (1.0, np.ones(2), np.zeros(2)))
     assert np.isnan([*course.violation, *course.best]).all()
 
 

@@ -57,7 +57,10 @@ FRAGMENTS = {
 """Shorter modules with one importer that are a concept of their own; there are to be no more."""
 LOCAL_WORDS = ("asked", "told", "wanted", "beside", "whole", "casebook", "meeting", "strangers",
                "admission", "checked", "course", "reconsider", "filmed", "soundness",
-               "crooked", "agility")  # fmt: skip
+               "crooked", "agility", "alike", "unlikeness", "likeness", "looks", "everywhere",
+               "resting", "retreat", "promised", "lose", "unsure", "tried", "followed", "pulled",
+               "worse", "way", "ways", "gone", "apart", "moved", "unclaimed", "untimed",
+               "stands", "carried", "eye")  # fmt: skip
 FEWEST_LOCAL_WORDS = 4
 
 

@@ -19,7 +19,7 @@ from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.calibration import computed_sets, computed_track, estimates, fit_uncertainty, inputs
 from pipeline.calibration.experiments import Experiment, force_displacement, free_decay, full_field
-from pipeline.calibration.fit_constants import fit_settled
+from pipeline.calibration.fit_constants import fit_converged
 from pipeline.calibration.least_squares import FitModel
 from pipeline.runtime import ROOT
 from sim.core import Floats
@@ -155,7 +155,7 @@ def tried(case: Case) -> Trials:
 
 def _estimated(case: Case, random: np.random.Generator) -> estimates.Estimate:
     model = FitModel(inputs.start_constants(case.asked), case.asked.fit, case.draw(random))
-    found = fit_settled(model)
+    found = fit_converged(model)
     return estimates.estimate_constants(found, fit_uncertainty.estimate_errors(found))
 
 

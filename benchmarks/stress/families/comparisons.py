@@ -19,10 +19,10 @@ from benchmarks.stress import (
     RandomDesigns,
     StressCase,
     StressScene,
-    apart,
     attempt,
     balance,
     family,
+    largest_difference,
     posed,
     solved,
     squares,
@@ -72,11 +72,12 @@ def _equivalent(
     one = _posed(lattice, _same(lattice), contact)
     other = _posed(_restated(lattice, restated), restated, contact)
     first, second = (solved(case, _solver(case, solver)).displacement for case in (one, other))
-    wanted = first.reshape(len(first), -1, 3)[:, restated.order]
-    wanted = np.concatenate(
-        [wanted[..., :2] @ restated.turn.T, np.linalg.det(restated.turn) * wanted[..., 2:]], axis=-1
+    expected = first.reshape(len(first), -1, 3)[:, restated.order]
+    expected = np.concatenate(
+        [expected[..., :2] @ restated.turn.T, np.linalg.det(restated.turn) * expected[..., 2:]],
+        axis=-1,
     )
-    off = np.abs(wanted - second.reshape(wanted.shape)).max() / np.abs(wanted).max()
+    off = np.abs(expected - second.reshape(expected.shape)).max() / np.abs(expected).max()
     return [Check("difference from the same told otherwise", float(off), EXACT)]
 
 
@@ -180,7 +181,7 @@ def _equilibria(draws: RandomDesigns, seed: int) -> Sequence[Check]:
         state[free] = minimize(energy, state[free], **given).x
         found.append(state.copy())
     other = Answer(np.array(found), answer.velocity, answer.record)
-    return [Check("distance from SciPy's minima", apart(case, answer, other), 1e-6)]
+    return [Check("distance from SciPy's minima", largest_difference(case, answer, other), 1e-6)]
 
 
 def _energy(case: StressScene, state: Floats, free: Floats, order: int) -> Any:  # noqa: ANN401
@@ -203,7 +204,7 @@ def _motions(draws: RandomDesigns, seed: int) -> Sequence[Check]:
     solvers: dict[str, Solver] = {"implicit": implicit, "explicit": explicit}
     for name, solver in solvers.items():
         answer = solved(case, solver)
-        off = apart(case, answer, Answer(exact, answer.velocity, answer.record))
+        off = largest_difference(case, answer, Answer(exact, answer.velocity, answer.record))
         checks.append(Check(f"distance of {name} steps from SciPy's", off, 2e-3))
     return checks
 

@@ -9,13 +9,13 @@ import numpy as np
 from benchmarks.stress import (
     LAWS,
     Check,
+    ExpectedVerdict,
     StressCase,
     StressScene,
-    Wanted,
-    apart,
     attempt,
     equilibria,
     family,
+    largest_difference,
     motions,
     posed,
     pressed,
@@ -28,8 +28,8 @@ from sim.solvers import Harmonic, PrescribedMotion, Solver, TimeSeries, solve_ca
 from sim.structure import ConcreteParameters
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 
-HARD = Harmonic(8.0, 30.0, 0.6)
-CHAOS = 0.1
+HARD_DRIVE = Harmonic(8.0, 30.0, 0.6)
+CHAOTIC_ERROR = 0.1
 """What half the steps may change where units collide again and again."""
 
 
@@ -37,7 +37,7 @@ CHAOS = 0.1
 def barrier(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     side = 5 if small else 9
-    yield from _starts((-14.99, -16.0) if small else (-14.99, -15.0, -16.0, -40.0))
+    yield from _initial_angles((-14.99, -16.0) if small else (-14.99, -15.0, -16.0, -40.0))
     for share in (0.25,) if small else (0.05, 0.1, 0.15, 0.2, 0.25):
         for law, contact in LAWS.items():
             for n_loads in (1,) if small else (1, 10):
@@ -46,31 +46,33 @@ def barrier(small: bool) -> Iterator[StressCase]:
                 name = f"pressed by {share:.0%} in {n_loads} loads, contact on {law}"
                 yield attempt(name, equilibria, case, loads)
     for law, contact in LAWS.items():
-        case = shaken(squares(side), HARD, duration=0.05, frequency=30.0, contact=contact)
-        yield attempt(f"8 mm at 30 Hz, contact on {law}", motions, case, 101, CHAOS)
-    case = shaken(squares(5), HARD, duration=0.02, frequency=30.0)
+        case = shaken(squares(side), HARD_DRIVE, duration=0.05, frequency=30.0, contact=contact)
+        yield attempt(f"8 mm at 30 Hz, contact on {law}", motions, case, 101, CHAOTIC_ERROR)
+    case = shaken(squares(5), HARD_DRIVE, duration=0.02, frequency=30.0)
     for n_steps in (1,) if small else (1, 10, 100):
         yield attempt(f"{n_steps} explicit steps asked for", _too_large, case, n_steps)
 
 
-def _starts(angles: Sequence[float]) -> Iterator[StressCase]:
+def _initial_angles(angles: Sequence[float]) -> Iterator[StressCase]:
     for angle in angles:
         lattice = squares(5, bias=45.0 - angle / 2)
         beyond = angle <= -15.0
         for share in (0.02, -0.05):
             name = f"voids of {angle:g} deg at rest, {'pressed' if share > 0 else 'pulled'}"
             plate = pressed(lattice, share)
-            wanted: Wanted = "refusal" if beyond else "solution"
-            yield attempt(name, equilibria, plate, np.array([0.0, 0.5, 1.0]), wanted=wanted)
+            expected: ExpectedVerdict = "refusal" if beyond else "solution"
+            yield attempt(name, equilibria, plate, np.array([0.0, 0.5, 1.0]), expected=expected)
         gentle = shaken(lattice, Harmonic(0.2, 30.0), duration=0.01, frequency=30.0)
         for integrator in ("implicit", "explicit"):
             case = replace(gentle, scene=gentle.scene.updated(integrator=integrator))
             name = f"voids of {angle:g} deg at rest, shaken, {integrator}"
-            yield attempt(name, motions, case, 101, CHAOS, wanted="refusal" if beyond else "either")
-    yield from _jolts()
+            yield attempt(
+                name, motions, case, 101, CHAOTIC_ERROR, expected="refusal" if beyond else "either"
+            )
+    yield from _beyond_barrier()
 
 
-def _jolts() -> Iterator[StressCase]:
+def _beyond_barrier() -> Iterator[StressCase]:
     """Yields held units that are beyond the barrier from the first moment, or get there."""
     for start, sense in ((-2.0, "further"), (-2.0, "back")):
         end = -3.0 if sense == "further" else 0.0
@@ -81,13 +83,13 @@ def _jolts() -> Iterator[StressCase]:
         explicit = ExplicitSolver(case.topology, 0.01, 100, times)
         for name, solver in (("implicit", implicit), ("explicit", explicit)):
             said = f"turned beyond the barrier at once, then {sense}, {name}"
-            yield attempt(said, motions, case, times, CHAOS, solver, wanted="refusal")
+            yield attempt(said, motions, case, times, CHAOTIC_ERROR, solver, expected="refusal")
 
 
 def _too_large(case: StressScene, n_steps: int) -> Sequence[Check]:
     asked = np.array([case.scene.loads.duration])
     solver = ExplicitSolver(case.topology, case.scene.loads.duration, n_steps, asked)
-    return motions(case, asked, CHAOS, solver)
+    return motions(case, asked, CHAOTIC_ERROR, solver)
 
 
 LOADS = np.array([0.5, 1.0])
@@ -147,7 +149,7 @@ def _single(name: str, solver: Solver) -> Sequence[Check]:
     wide = displacement.dtype == np.float64 and velocity.dtype == np.float64
     return [
         Check("answer is not of 64 bits", int(not wide), 0),
-        Check("change by 32-bit input", apart(case, whole, answer), SINGLE),
+        Check("change by 32-bit input", largest_difference(case, whole, answer), SINGLE),
     ]
 
 
@@ -156,15 +158,15 @@ def _nonsense() -> Iterator[StressCase]:
         for field in ("arm", "vector", "void", "law", "contact", "mass", "damping"):
             for value in (np.nan, np.inf):
                 said = f"{field} is {value}, {name}"
-                yield attempt(said, _spoilt, name, solver, field, value, wanted="refusal")
+                yield attempt(said, _corrupted, name, solver, field, value, expected="refusal")
         for field, value in (("mass", 0.0), ("mass", -1.0), ("law", -1.0), ("damping", -1e3)):
             if name == "static" and field != "law":
                 continue
             said = f"{field} is {value:g}, {name}"
-            yield attempt(said, _spoilt, name, solver, field, value, wanted="refusal")
+            yield attempt(said, _corrupted, name, solver, field, value, expected="refusal")
 
 
-def _spoilt(name: str, solver: Solver, field: str, value: float) -> Sequence[Check]:
+def _corrupted(name: str, solver: Solver, field: str, value: float) -> Sequence[Check]:
     case = pressed(squares(5), 0.05) if name == "static" else _case()
     bad = np.array(getattr(case.values, field))
     bad.flat[len(bad.flat) // 2] = value

@@ -43,10 +43,12 @@ def designs(small: bool) -> Iterator[StressCase]:
         partial(_motion, fast, 0.05),
     )
     for seed in range(6 if small else 1000):
-        yield attempt(f"design {seed}", _both, draws, seed, plate, attempts[seed % len(attempts)])
+        yield attempt(
+            f"design {seed}", _both_kinds, draws, seed, plate, attempts[seed % len(attempts)]
+        )
 
 
-def _both(
+def _both_kinds(
     draws: RandomDesigns, seed: int, plate: StressScene, more: partial[Sequence[Check]]
 ) -> Sequence[Check]:
     vertices = draws(seed)

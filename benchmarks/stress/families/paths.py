@@ -9,12 +9,12 @@ from benchmarks.stress import (
     Check,
     StressCase,
     StressScene,
-    admissible,
-    apart,
     attempt,
-    balanced,
+    check_admissible,
+    check_balance,
     equilibria,
     family,
+    largest_difference,
     motions,
     posed,
     solved,
@@ -60,14 +60,14 @@ def _paths(length: int) -> Iterator[tuple[str, StressScene]]:
 def _followed(case: StressScene, n_loads: int) -> Sequence[Check]:
     loads = np.arange(1, n_loads + 1) / n_loads
     answer = solved(case, case.solver(loads))
-    checks = [*admissible(case, answer.displacement), *balanced(case, answer)]
+    checks = [*check_admissible(case, answer.displacement), *check_balance(case, answer)]
     record = answer.record
     assert isinstance(record, static_solver.StaticRecord)
     if record.jumped.any():
         return checks
     fine = solved(case, case.solver(np.arange(1, 10 * n_loads + 1) / (10 * n_loads)))
     same = fine._replace(displacement=fine.displacement[9::10])
-    difference = apart(case, answer, same)
+    difference = largest_difference(case, answer, same)
     return [*checks, Check("difference from ten times the loads", difference, 1e-6)]
 
 
@@ -103,9 +103,11 @@ def _rigid(turns: float) -> Sequence[Check]:
     c, s = np.cos(angles), np.sin(angles)
     turned = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], -2)
     place = offset @ turned - offset
-    wanted = np.concatenate([place, np.repeat(angles[:, None, None], 9, axis=1)], axis=-1)
-    other = answer._replace(displacement=wanted.reshape(len(loads), -1))
-    return [Check("distance from the rigid rotation", apart(case, answer, other), 1e-8)]
+    expected = np.concatenate([place, np.repeat(angles[:, None, None], 9, axis=1)], axis=-1)
+    other = answer._replace(displacement=expected.reshape(len(loads), -1))
+    return [
+        Check("distance from the rigid rotation", largest_difference(case, answer, other), 1e-8)
+    ]
 
 
 def _rolled(turns: float) -> Sequence[Check]:

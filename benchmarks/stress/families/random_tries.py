@@ -14,7 +14,7 @@ from benchmarks.stress import (
     StressCase,
     StressScene,
     attempt,
-    balanced,
+    check_balance,
     endless_family,
     posed,
     pressed,
@@ -44,10 +44,10 @@ AMPLITUDE = 1.0
 
 def _tries(name: str, small: bool, check: Callable[[int], Sequence[Check]]) -> Iterator[StressCase]:
     for seed in range(FEW) if small else count():
-        yield attempt(f"{name}, draw {seed}", check, seed, wanted="either")
+        yield attempt(f"{name}, draw {seed}", check, seed, expected="either")
 
 
-def _judged(true: float, stated: float) -> list[Check]:
+def _compare_errors(true: float, stated: float) -> list[Check]:
     """Compares a relative error with what is stated of it."""
     off = true / max(MOST * stated, ROUNDING)
     checks = [Check("true error over three times the stated one", off, 1.0)]
@@ -80,7 +80,7 @@ def _turned(seed: int) -> Sequence[Check]:
     plan_losses = np.asarray(simulate(together).losses)
     checks: list[Check] = []
     for case, loss in zip(alone, plan_losses, strict=True):
-        checks += balanced(case, solved(case, case.solver(sample_times(case.scene))))
+        checks += check_balance(case, solved(case, case.solver(sample_times(case.scene))))
         other = float(simulate(case.scene).loss)
         checks.append(Check("loss off that of one case", abs(loss - other) / other, 1e-8))
     return checks
@@ -136,7 +136,10 @@ def _in_time(
     losses = [float(each.loss) for each in (response, finer, right)]
     stated = estimated_errors((ours, half), (losses[0], losses[1]), losses[1])
     moved = float(np.linalg.norm(ours - truth) / np.linalg.norm(truth))
-    return [*_judged(moved, stated[0]), *_judged(abs(losses[0] / losses[2] - 1.0), stated[1])]
+    return [
+        *_compare_errors(moved, stated[0]),
+        *_compare_errors(abs(losses[0] / losses[2] - 1.0), stated[1]),
+    ]
 
 
 def _by_dop853(case: StressScene, motion: Harmonic | Pulse) -> Floats:
@@ -207,13 +210,13 @@ def _traced(case: StressScene, loads: Floats) -> Sequence[Check]:
     answer = solved(case, case.solver(loads))
     record = answer.record
     assert isinstance(record, StaticRecord)
-    checks = balanced(case, answer)
+    checks = check_balance(case, answer)
     snap = record.snaps[0] if len(record.snaps) else np.inf
     rest = np.zeros(case.topology.n_dofs)
     end = min(snap * (1.0 + 1e-6), 1.0)
     path = trace(case.topology, case.values, case.drive, (0.0, rest), end, 2000, SHORT)
     # a step may pass from a branch that is nearly straight to the straight one, which is unstable
-    lost = np.flatnonzero(path.falling)
+    lost = np.flatnonzero(path.n_negative)
     turns = path.loads[path.turns]
     stable = path.loads[: lost[0]] if len(lost) else path.loads
     known = min(snap, stable[-1] if len(lost) else np.inf)

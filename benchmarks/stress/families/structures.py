@@ -9,9 +9,9 @@ from benchmarks.stress import (
     LAWS,
     NONE,
     Check,
+    ExpectedVerdict,
     StressCase,
     StressScene,
-    Wanted,
     attempt,
     equilibria,
     family,
@@ -39,12 +39,14 @@ def sizes(small: bool) -> Iterator[StressCase]:
     for columns, rows in [(3, 3), (8, 8)] if small else shapes:
         lattice, name = squares(columns, rows), f"{columns} x {rows}"
         loads = np.array([1.0])
-        wanted: Wanted = "solution" if columns > 2 else "refusal"  # or no unit is free
-        yield attempt(f"{name}, pressed", equilibria, pressed(lattice, 0.1), loads, wanted=wanted)
+        expected: ExpectedVerdict = "solution" if columns > 2 else "refusal"  # or no unit is free
+        yield attempt(
+            f"{name}, pressed", equilibria, pressed(lattice, 0.1), loads, expected=expected
+        )
         if max(columns, rows) <= TOUCHING:
             touching = pressed(lattice, 0.1, contact=LAWS["distances"])
             said = f"{name}, contact on distances"
-            yield attempt(said, equilibria, touching, loads, wanted=wanted)
+            yield attempt(said, equilibria, touching, loads, expected=expected)
         if min(columns, rows) > 2:
             case = shaken(lattice, Harmonic(1.0, 60.0, 0.8), duration=2e-3, frequency=60.0)
             for integrator in ("implicit", "explicit"):
@@ -62,19 +64,21 @@ def _shaken(case: StressScene, integrator: str) -> Sequence[Check]:
 LOADS = np.array([0.5, 1.0])
 SIDE = 5
 ASKED = np.linspace(0.0, 0.02, 21)
-HUM = Harmonic(0.5, 60.0)
+HUM_DRIVE = Harmonic(0.5, 60.0)
 
 
 @family
 def pieces(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
-    for name, lattice, wanted in list(_structures())[:2] if small else _structures():
+    for name, lattice, expected in list(_structures())[:2] if small else _structures():
         plate = pressed(lattice, 0.04)
-        yield attempt(f"{name}, pressed", equilibria, plate, LOADS, wanted=wanted)
+        yield attempt(f"{name}, pressed", equilibria, plate, LOADS, expected=expected)
         for integrator in ("implicit", "explicit"):
             case = shaken_ends(lattice, integrator)
-            more: Wanted = "solution" if len(lattice.ligaments) else "refusal"
-            yield attempt(f"{name}, shaken, {integrator}", motions, case, ASKED, 0.15, wanted=more)
+            more: ExpectedVerdict = "solution" if len(lattice.ligaments) else "refusal"
+            yield attempt(
+                f"{name}, shaken, {integrator}", motions, case, ASKED, 0.15, expected=more
+            )
     yield from _odd()
     for unit in (6,) if small else (0, 6, 7, 12, 17):
         for static in (True, False):
@@ -82,7 +86,7 @@ def pieces(small: bool) -> Iterator[StressCase]:
             yield attempt(f"cloak of unit {unit}, {kind}", _cloak, unit, static)
 
 
-def _structures() -> Iterator[tuple[str, Lattice, Wanted]]:
+def _structures() -> Iterator[tuple[str, Lattice, ExpectedVerdict]]:
     """Yields lattices, and whether they have a stable equilibrium under a load."""
     whole = squares(SIDE)
     yield "a whole lattice", whole, "solution"
@@ -111,19 +115,19 @@ def _odd() -> Iterator[StressCase]:
     """Yields what hardly is a lattice any more."""
     free = posed(squares(3), NONE, [4], LinearRamp(1.0, 1.0), static=True)
     said = "held by nothing but the driven unit"
-    yield attempt(said, equilibria, free, LOADS, wanted="refusal")
+    yield attempt(said, equilibria, free, LOADS, expected="refusal")
     chain = quads(2, 1, 15.0, 2.25, 0.3)
     held = posed(chain, [0], [1], LinearRamp(0.5, 1.0), static=True)
-    yield attempt("all units held, static", equilibria, held, LOADS, wanted="refusal")
+    yield attempt("all units held, static", equilibria, held, LOADS, expected="refusal")
     for integrator in ("implicit", "explicit"):
         more = {"duration": 0.02, "frequency": 60.0, "integrator": integrator}
-        said, moving = f"all units held, {integrator}", posed(chain, [0], [1], HUM, **more)
-        yield attempt(said, motions, moving, ASKED, 0.05, wanted="refusal")
+        said, moving = f"all units held, {integrator}", posed(chain, [0], [1], HUM_DRIVE, **more)
+        yield attempt(said, motions, moving, ASKED, 0.05, expected="refusal")
     sliding = pressed(squares(SIDE), 0.04)
     along = sliding.scene.updated(supports=(Clamp(5 * np.arange(5), ("ux",)),))
     yield attempt("clamped along x alone", equilibria, replace(sliding, scene=along), LOADS)
     alone = posed(quads(1, 1, 15.0, 2.25, 0.3), NONE, [0], LinearRamp(1.0, 1.0), static=True)
-    yield attempt("a single unit, driven", equilibria, alone, LOADS, wanted="refusal")
+    yield attempt("a single unit, driven", equilibria, alone, LOADS, expected="refusal")
 
 
 def _cloak(unit: int, static: bool) -> Sequence[Check]:
@@ -143,5 +147,7 @@ def _cloak(unit: int, static: bool) -> Sequence[Check]:
     slope = evaluate(start)[1] @ direction
     step = 1e-4
     losses = [evaluate(start + factor * step * direction)[0] for factor in (-2, -1, 1, 2)]
-    wanted = float(np.dot([1, -8, 8, -1], losses) / (12 * step))
-    return [Check("slope of the loss off its differences", float(abs(slope / wanted - 1.0)), 1e-5)]
+    expected = float(np.dot([1, -8, 8, -1], losses) / (12 * step))
+    return [
+        Check("slope of the loss off its differences", float(abs(slope / expected - 1.0)), 1e-5)
+    ]

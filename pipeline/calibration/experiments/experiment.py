@@ -90,7 +90,7 @@ class MeasuredValues:
         return white - self.axes @ (part * (self.axes.T @ white).T).T
 
     def _less_mean(self, scaled: Floats) -> Floats:
-        """Takes from multiples (n, ...) of ``sigma`` what a bias of their channels may explain."""
+        """Removes from multiples (n, ...) of ``sigma`` what a bias of their channels explains."""
         if not len(self.bias):
             return scaled
         weight = 1 / self.sigma
@@ -121,21 +121,21 @@ class Experiment(Protocol):
         ...
 
     @property
-    def sees(self) -> tuple[ConstantName, ...]:
+    def depends_on(self) -> tuple[ConstantName, ...]:
         """Returns the constants that the measurements depend on."""
         ...
 
     @property
-    def own_start(self) -> Floats:
+    def nuisance_start(self) -> Floats:
         """(n_own,) unknowns of this set alone to start from."""
         ...
 
     @property
-    def own_scale(self) -> Floats:
+    def nuisance_scale(self) -> Floats:
         """(n_own,) changes of them that are about as visible as one of a constant by e."""
         ...
 
-    def predict(self, constants: Constants, own: Floats) -> Floats:
+    def predict(self, constants: Constants, nuisance: Floats) -> Floats:
         """Predicts the measurements (n,) without errors.
 
         Raises:

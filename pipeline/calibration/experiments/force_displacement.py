@@ -12,7 +12,7 @@ from jax import Array
 from pipeline import datasets
 from pipeline.calibration.experiments.experiment import ELASTIC, LEAST_LINES, MeasuredValues
 from pipeline.calibration.experiments.load_cycles import prepare_record
-from pipeline.calibration.experiments.simulated_experiment import Seen, SpecimenSimulation
+from pipeline.calibration.experiments.simulated_experiment import Observation, SpecimenSimulation
 from pipeline.calibration.inputs import (
     ConstantName,
     Constants,
@@ -39,7 +39,7 @@ TOLERANCE = 1e-12
 
 
 class ForceFile(Protocol):
-    """Tells a file of forces: its test and columns, and how a record is cut."""
+    """Describes a file of forces: its test and columns, and how a record is cut."""
 
     @property
     def test(self) -> TestKind: ...  # noqa: D102
@@ -144,25 +144,25 @@ class ForceTest:
     measured: MeasuredValues
     simulation: SpecimenSimulation
     tare: bool
-    sees: tuple[ConstantName, ...] = ELASTIC
+    depends_on: tuple[ConstantName, ...] = ELASTIC
 
     @property
-    def own_start(self) -> Floats:
+    def nuisance_start(self) -> Floats:
         """Computes the load cell's zero, N, if it is unknown."""
         return np.zeros(int(self.tare))
 
     @property
-    def own_scale(self) -> Floats:
+    def nuisance_scale(self) -> Floats:
         """See ``experiment.Experiment``."""
         return np.full(int(self.tare), float(np.abs(self.measured.values).max()))
 
-    def predict(self, constants: Constants, own: Floats) -> Floats:
+    def predict(self, constants: Constants, nuisance: Floats) -> Floats:
         """Predicts forces, see ``experiment.Experiment``."""
-        return self.simulation.predict(constants) + own.sum()
+        return self.simulation.predict(constants) + nuisance.sum()
 
-    def pulled_back(self, constants: Constants, bar: Floats) -> Floats:
+    def pull_back(self, constants: Constants, bar: Floats) -> Floats:
         """Differentiates `bar @ predict` by the specimen's numbers (5,), by the adjoint."""
-        return self.simulation.pulled_back(constants, bar)
+        return self.simulation.pull_back(constants, bar)
 
 
 def pose_force_test(
@@ -198,7 +198,7 @@ def pose_simulation(
     )
 
 
-def force_on(lattice: Lattice, moved: Ints, towards: Floats) -> Seen:
+def force_on(lattice: Lattice, moved: Ints, towards: Floats) -> Observation:
     """Computes the force (n,) on units along a direction: the slope of energy over their shift.
 
     Contact acts on rotations alone, so its energy does not change with a displacement.

@@ -13,9 +13,9 @@ from pipeline.runtime import UserError
 from sim.core import Floats
 from sim.structure import unrotated_inertia
 
-APART = 0.75
+LEAST_DISTANCE = 0.75
 """Peaks are at least so many periods apart."""
-VISIBLE = 0.1
+VISIBLE_PEAK = 0.1
 """Peaks below this part of the highest are left out."""
 LEAST_PEAKS = 4
 SAMPLES = 32
@@ -67,8 +67,8 @@ def fit_peaks(time: Floats, angle: Floats) -> DecayPeaks | None:
     course = detrend(np.interp(even, time, angle))
     spectrum = np.abs(np.fft.rfft(course * np.hanning(len(course))))
     period = len(course) / max(int(spectrum.argmax()), 1)
-    place, _ = find_peaks(course, distance=max(APART * period, 1.0))
-    place = place[course[place] > VISIBLE * course.max()]
+    place, _ = find_peaks(course, distance=max(LEAST_DISTANCE * period, 1.0))
+    place = place[course[place] > VISIBLE_PEAK * course.max()]
     if len(place) < LEAST_PEAKS:
         return None
     left, top, right = course[place - 1], course[place], course[place + 1]
@@ -95,30 +95,34 @@ class DecayTest:
 
     measured: MeasuredValues
     peaks: DecayPeaks
-    sees: tuple[ConstantName, ...] = ("damping_ratio", "damping_rotation", "bending_stiffness")
+    depends_on: tuple[ConstantName, ...] = (
+        "damping_ratio",
+        "damping_rotation",
+        "bending_stiffness",
+    )
 
-    def pitch(self, constants: Constants) -> float:
+    def frequency_ratio(self, constants: Constants) -> float:
         """Divides the frequency of the trace by that of the law that tells its damping ratio."""
         undamped = self.peaks.frequency / np.sqrt(1 - self.peaks.ratio**2)
         return float(undamped / hinge_frequency(constants))
 
     @property
-    def own_start(self) -> Floats:
+    def nuisance_start(self) -> Floats:
         """Fits offset, drift and amplitudes at the peaks' frequency and damping."""
         frequency = self.peaks.frequency / np.sqrt(1 - self.peaks.ratio**2)
         shapes = decay_terms(self.measured.abscissa, self.peaks.ratio, frequency)
         return np.append(np.linalg.lstsq(shapes, self.measured.values)[0], np.log(frequency))
 
     @property
-    def own_scale(self) -> Floats:
+    def nuisance_scale(self) -> Floats:
         """See ``experiment.Experiment``."""
         size, whole = np.ptp(self.measured.values), np.ptp(self.measured.abscissa)
         return np.array([size, size / whole, size, size, 1 / (self.peaks.frequency * whole)])
 
-    def predict(self, constants: Constants, own: Floats) -> Floats:
+    def predict(self, constants: Constants, nuisance: Floats) -> Floats:
         """Predicts angles, see ``experiment.Experiment``."""
-        shapes = decay_terms(self.measured.abscissa, constants.ratio, float(np.exp(own[-1])))
-        return np.asarray(shapes @ own[:-1])
+        shapes = decay_terms(self.measured.abscissa, constants.ratio, float(np.exp(nuisance[-1])))
+        return np.asarray(shapes @ nuisance[:-1])
 
 
 def hinge_frequency(constants: Constants) -> float:

@@ -12,8 +12,8 @@ from pipeline.calibration.experiments.experiment import ELASTIC, MeasuredValues
 from pipeline.calibration.experiments.load_cell import LoadCellReadings, read_load
 from pipeline.calibration.experiments.measured_drive import DriveChange, apply_changes, smooth_drive
 from pipeline.calibration.experiments.simulated_experiment import (
-    AnySolver,
-    Seen,
+    ExperimentSolver,
+    Observation,
     SpecimenSimulation,
 )
 from pipeline.calibration.experiments.tracked_specimen import pose_specimen
@@ -32,14 +32,14 @@ from sim.time_integration import ImplicitSolver
 
 TOLERANCE = 1e-12
 """Of equilibria, relative."""
-STAGES = 1e-7
+STAGE_TOLERANCE = 1e-7
 """Of the stages of a motion in time, mm/s."""
-STEPS = 2
+STEPS_PER_KNOT = 2
 """In time, between knots of the drive; more where it matters (``fitting``)."""
-UNKNOWN = np.array([0.1, 0.1, np.deg2rad(0.5)])
+DEFAULT_BIAS = np.array([0.1, 0.1, np.deg2rad(0.5)])
 """Standard deviation (mm, mm, rad) of what stays with a held unit, where it is not stated."""
 DAMPING: tuple[ConstantName, ...] = ("damping_ratio", "damping_translation", "damping_rotation")
-COARSE = (
+COARSE_WARNING = (
     "the frames are too few for the motion of the drive, so that what is between them may be"
     " missed: film faster, or drive more slowly"
 )
@@ -51,33 +51,34 @@ class FullFieldExperiment:
 
     measured: MeasuredValues  # displacements of the free units, course by course; then the load
     simulation: SpecimenSimulation  # of the specimen under the measured motion of the held units
-    sees: tuple[ConstantName, ...]  # the constants that the motion depends on
+    depends_on: tuple[ConstantName, ...]  # the constants that the motion depends on
     changes: tuple[DriveChange, ...]  # by one standard deviation of that motion's noise each
     drive: PrescribedMotion | None = None  # with the changes that free units speak for
-    part: Floats = field(default_factory=lambda: np.zeros(()))  # (n,) what these changes make
+    # (n,) of these changes on the prediction
+    noise_effect: Floats = field(default_factory=lambda: np.zeros(()))
 
     @property
-    def own_start(self) -> Floats:
+    def nuisance_start(self) -> Floats:
         """None."""
         return np.zeros(0)
 
     @property
-    def own_scale(self) -> Floats:
+    def nuisance_scale(self) -> Floats:
         """None."""
         return np.zeros(0)
 
-    def predict(self, constants: Constants, own: Floats) -> Floats:
+    def predict(self, constants: Constants, nuisance: Floats) -> Floats:
         """Predicts the motion, see ``experiment.Experiment``."""
-        del own
-        return self.simulation.predict(constants, self.drive) - self.part
+        del nuisance
+        return self.simulation.predict(constants, self.drive) - self.noise_effect
 
-    def pulled_back(self, constants: Constants, bar: Floats) -> Floats:
+    def pull_back(self, constants: Constants, bar: Floats) -> Floats:
         """Differentiates `bar @ predict` by the specimen's numbers (5,), by the adjoint."""
-        return self.simulation.pulled_back(constants, bar, self.drive)
+        return self.simulation.pull_back(constants, bar, self.drive)
 
-    def pulled_to_noise(self, constants: Constants, bar: Floats) -> Floats:
+    def pull_back_to_noise(self, constants: Constants, bar: Floats) -> Floats:
         """Computes derivatives (n_changes,) of `bar @ predict` by sizes of the drive's changes."""
-        motion = self.simulation.pulled_to_drive(constants, bar, self.drive)
+        motion = self.simulation.pull_back_to_drive(constants, bar, self.drive)
         assert isinstance(motion, redrive.HermiteMotion)
         value, slope = np.asarray(motion.value), np.asarray(motion.slope)
         return np.array(
@@ -112,7 +113,7 @@ class FullFieldExperiment:
             axis=1,
         )
         measured = self.measured.with_common(causes)
-        return replace(self, measured=measured, drive=drive, part=causes @ size)
+        return replace(self, measured=measured, drive=drive, noise_effect=causes @ size)
 
     def finer(self) -> "FullFieldExperiment":
         """Halves the steps in time; of equilibria there are none."""
@@ -131,7 +132,7 @@ def pose_track(
     _refuse_other_contact(made.scene, begin, folder / asked.problem)
     vertices = made.vertices(track, path)
     upright = made.upright(track, vertices)
-    bias = UNKNOWN if asked.bias is None else per_dof(asked.bias)
+    bias = DEFAULT_BIAS if asked.bias is None else per_dof(asked.bias)
     try:
         drive = smooth_drive(upright, made.scene, bias)
     except UserError as error:
@@ -141,25 +142,27 @@ def pose_track(
     frames = np.arange(0, track.sizes["time"], asked.every)
     shown = upright.isel(time=frames)
     chosen = _select_values(shown, driven)
-    measured, load = _measured(asked, shown, driven, chosen), None
+    measured, load = _measured_values(asked, shown, driven, chosen), None
     if asked.load is not None:
         load = read_load(asked.load, made, asked.case, shown, path)
-        measured = load.joined(measured)
+        measured = load.append_to(measured)
     simulation = SpecimenSimulation(
         driven.lattice,
         vertices,
         begin.material.density,
         float(np.max(driven.structure.material.contact_stiffness)),
-        _solver(
+        _make_solver(
             driven, shown["time"].values - track["time"].values[0], len(drive.held.motion.value)
         ),
         PrescribedMotion(drive.held.unit, drive.held.motion),
-        _seen(chosen, load),
-        made.stiffer,
+        _make_observation(chosen, load),
+        made.stiffness_factors,
     )
-    remarks = (COARSE,) if drive.coarse else ()
-    sees = ELASTIC if driven.loads.static else (*ELASTIC, *DAMPING)
-    return FullFieldExperiment(replace(measured, remarks=remarks), simulation, sees, drive.changes)
+    remarks = (COARSE_WARNING,) if drive.coarse else ()
+    depends_on = ELASTIC if driven.loads.static else (*ELASTIC, *DAMPING)
+    return FullFieldExperiment(
+        replace(measured, remarks=remarks), simulation, depends_on, drive.changes
+    )
 
 
 def per_dof(error: PoseError) -> Floats:
@@ -196,7 +199,7 @@ def _select_values(track: xr.Dataset, driven: Scene) -> Ints:
     return np.argwhere(counts)
 
 
-def _measured(
+def _measured_values(
     asked: TrackedMotion, track: xr.Dataset, driven: Scene, chosen: Ints
 ) -> MeasuredValues:
     """Selects the values of a track that count, in the design's frame."""
@@ -206,7 +209,7 @@ def _measured(
         track[name].transpose("unit", "dof", "time").values.astype(float)[unit, dof, frame]
         for name in ("displacement", "sigma")
     )
-    own = np.full(3, np.inf) if asked.bias is None else per_dof(asked.bias)
+    bias = np.full(3, np.inf) if asked.bias is None else per_dof(asked.bias)
     return MeasuredValues(
         asked.name,
         asked.kind,
@@ -215,27 +218,27 @@ def _measured(
         sigma,
         asked.noise == "tracker",
         3 * unit + dof,
-        own[dof],
+        bias[dof],
     )
 
 
-def _seen(chosen: Ints, load: LoadCellReadings | None) -> Seen:
-    """Measures a motion: the displacements that count, and the load if there is a cell."""
+def _make_observation(chosen: Ints, load: LoadCellReadings | None) -> Observation:
+    """Makes the observation of a motion: the displacements that count, and the load, if any."""
     unit, dof, frame = chosen.T
 
-    def seen(motion: Numbers, made: Parameters) -> Array:
+    def observe(motion: Numbers, made: Parameters) -> Array:
         moved = jnp.asarray(motion)
         parts = [] if load is None else [load.force(moved[load.frame], made)]
         return jnp.concatenate([moved[frame, unit, dof], *parts])
 
-    return seen
+    return observe
 
 
-def _solver(driven: Scene, asked: Floats, knots: int) -> AnySolver:
-    """The solver of the motion at the asked times, differentiable by every ligament's constants."""
+def _make_solver(driven: Scene, asked: Floats, knots: int) -> ExperimentSolver:
+    """Makes the solver of the motion at the times, differentiable by every ligament's constants."""
     whole = topology(driven.lattice, driven.loads.held, driven.structure.contact)
     if driven.loads.static:
         return StaticSolver(whole, asked, relative=TOLERANCE)
-    steps = np.linspace(0.0, driven.loads.duration, STEPS * (knots - 1) + 1)
+    steps = np.linspace(0.0, driven.loads.duration, STEPS_PER_KNOT * (knots - 1) + 1)
     whole = replace(whole, storages=FASTEST)
-    return ImplicitSolver(whole, steps, asked, STAGES, turn_allowance=TURN_ALLOWANCE)
+    return ImplicitSolver(whole, steps, asked, STAGE_TOLERANCE, turn_allowance=TURN_ALLOWANCE)

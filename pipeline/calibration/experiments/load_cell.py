@@ -9,7 +9,7 @@ import xarray as xr
 
 from pipeline.calibration.experiments.experiment import MeasuredValues
 from pipeline.calibration.experiments.force_displacement import force_on
-from pipeline.calibration.experiments.simulated_experiment import Seen
+from pipeline.calibration.experiments.simulated_experiment import Observation
 from pipeline.calibration.experiments.tracked_specimen import TrackedSpecimen
 from pipeline.calibration.inputs import LoadCellOptions
 from pipeline.runtime import UserError
@@ -25,10 +25,10 @@ class LoadCellReadings(NamedTuple):
     value: Floats  # (n,) N
     sigma: float  # standard deviation, N
     tare: bool  # whether the cell's zero is unknown
-    force: Seen  # what it reads of motions (n, n_units, 3) of the specimen
+    force: Observation  # what it reads of motions (n, n_units, 3) of the specimen
     channel: int  # its course, after those of all units
 
-    def joined(self, motion: MeasuredValues) -> MeasuredValues:
+    def append_to(self, motion: MeasuredValues) -> MeasuredValues:
         """Appends the readings to a motion."""
         count = len(self.value)
         return replace(

@@ -9,17 +9,17 @@ import numpy as np
 from pipeline.calibration.inputs import RecordOptions
 from sim.core import Floats
 
-TURN = 0.2
+REVERSAL = 0.2
 """Part of the whole range by which the displacement goes back where a branch ends."""
-WHOLE = 0.5
+LEAST_RANGE = 0.5
 """Part of the whole range that a branch at least goes over: others are approaches to a start."""
-PROMINENT = 0.2
+PROMINENCE = 0.2
 """Height of a peak of the force over its whole range."""
-SUDDEN = 0.2
-"""Way of a snap over the branch's, at most."""
+SNAP_WIDTH = 0.2
+"""Stroke of a snap over the branch's, at most."""
 START = 0.05
-"""Part of a branch's way over which its start is averaged."""
-CLEAR = 4.0
+"""Part of a branch's stroke over which its start is averaged."""
+TOE_SIGMAS = 4.0
 """Standard deviations of the noise above which a toe is at least."""
 LEAST_RESTING = 20
 """Readings from which the noise before contact is estimated, at least."""
@@ -28,7 +28,7 @@ MEDIAN_SIGMAS = 1.4826
 
 
 class LoadBranch(NamedTuple):
-    """Holds one way of a cycle."""
+    """Holds the loading or the unloading branch of a cycle."""
 
     loading: bool  # whether the displacement rises
     displacement: Floats  # (n,) in the order of time, mm
@@ -40,7 +40,7 @@ class LoadBranch(NamedTuple):
         return float(np.trapezoid(self.force, self.displacement))
 
     def at(self, displacement: Floats) -> Floats:
-        """Interpolates the force (n,); NaN where the branch does not go."""
+        """Interpolates the force (n,); NaN outside of the branch."""
         order = np.argsort(self.displacement, kind="stable")
         known = self.displacement[order], self.force[order]
         return np.interp(displacement, *known, left=np.nan, right=np.nan)
@@ -60,15 +60,15 @@ def split_branches(displacement: Floats, force: Floats) -> list[LoadBranch]:
 
     A shorter approach to the start, and a shorter way back at the end, are left out.
     """
-    turns, reach = [0], TURN * float(np.ptp(displacement))
+    turns, reach = [0], REVERSAL * float(np.ptp(displacement))
     rising = None
     for k, here in enumerate(displacement):
         last = displacement[turns[-1]]
         if rising is None:
             if abs(here - last) > reach:
                 rising = here > last
-                way = displacement[: k + 1]
-                turns = [int(way.argmin() if rising else way.argmax()), k]
+                stroke = displacement[: k + 1]
+                turns = [int(stroke.argmin() if rising else stroke.argmax()), k]
         elif (here > last) == rising:
             turns[-1] = k
         elif abs(here - last) > reach:
@@ -77,7 +77,11 @@ def split_branches(displacement: Floats, force: Floats) -> list[LoadBranch]:
     parts = [
         (displacement[first : last + 1], force[first : last + 1]) for first, last in pairwise(turns)
     ]
-    return [LoadBranch(bool(way[-1] > way[0]), way, load) for way, load in parts if len(way) > 1]
+    return [
+        LoadBranch(bool(stroke[-1] > stroke[0]), stroke, load)
+        for stroke, load in parts
+        if len(stroke) > 1
+    ]
 
 
 def mean_branch(branches: Sequence[LoadBranch], points: int = 200) -> tuple[LoadBranch, Floats]:
@@ -95,7 +99,7 @@ def mean_branch(branches: Sequence[LoadBranch], points: int = 200) -> tuple[Load
 
 
 def loop_areas(branches: Sequence[LoadBranch]) -> Floats:
-    """Computes what each pair of a branch and the next one takes up (n_branches - 1,), N mm."""
+    """Integrates the hysteresis loops (n_branches - 1,) of each branch and the next, N mm."""
     pairs = pairwise(branches)
     return np.array([abs(first.work + second.work) for first, second in pairs])
 
@@ -105,8 +109,8 @@ def find_snaps(branch: LoadBranch) -> list[Snap]:
     from scipy.signal import find_peaks
 
     turn = slice(None) if branch.loading else slice(None, None, -1)
-    way, force = branch.displacement[turn], branch.force[turn]
-    height = PROMINENT * float(np.ptp(force))
+    stroke, force = branch.displacement[turn], branch.force[turn]
+    height = PROMINENCE * float(np.ptp(force))
     found = []
     for sign in (1.0, -1.0):
         peaks, _ = find_peaks(sign * force, prominence=height)
@@ -114,22 +118,24 @@ def find_snaps(branch: LoadBranch) -> list[Snap]:
         for peak in peaks:
             fallen = (turns > peak) & (sign * (force[peak] - force[turns]) > height)
             end = turns[fallen][0] if fallen.any() else peak
-            if sign * force[peak] > 0 and 0 < abs(way[end] - way[peak]) < SUDDEN * np.ptp(way):
-                found.append(Snap(*map(float, (way[peak], force[peak], way[end], force[end]))))
+            width = abs(stroke[end] - stroke[peak])
+            if sign * force[peak] > 0 and 0 < width < SNAP_WIDTH * np.ptp(stroke):
+                ends = stroke[peak], force[peak], stroke[end], force[end]
+                found.append(Snap(*map(float, ends)))
     return found
 
 
 def prepare_record(
     displacement: Floats, force: Floats, options: RecordOptions
 ) -> tuple[Floats, Floats]:
-    """Takes the wanted branches of a record, from the zero and the toe that are wanted.
+    """Selects branches of a record, and corrects them for the zero and the toe.
 
     Raises:
         ValueError: nothing is left.
     """
     turned = options.reversed
-    way = -displacement if turned in ("displacement", "both") else displacement
-    branches = split_branches(way, -force if turned in ("force", "both") else force)
+    stroke = -displacement if turned in ("displacement", "both") else displacement
+    branches = split_branches(stroke, -force if turned in ("force", "both") else force)
     if options.drop_first:
         branches = branches[2:]
     branches = [
@@ -140,43 +146,43 @@ def prepare_record(
     if not branches:
         raise ValueError("no such branch is in the record")
     parts = [_from_start(each, options) for each in branches]
-    way, load = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return way, load
+    stroke, load = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return stroke, load
 
 
 def _from_start(branch: LoadBranch, options: RecordOptions) -> tuple[Floats, Floats]:
-    way, load = branch.displacement, branch.force
+    stroke, load = branch.displacement, branch.force
     turn = slice(None) if branch.loading else slice(None, None, -1)
-    way, load = way[turn], load[turn]
+    stroke, load = stroke[turn], load[turn]
     if options.zero == "start":
-        first = way <= way.min() + START * np.ptp(way)
-        way, load = way - way[first].mean(), load - load[first].mean()
-    return (way, load) if options.toe is None else _from_contact(way, load, options.toe)
+        first = stroke <= stroke.min() + START * np.ptp(stroke)
+        stroke, load = stroke - stroke[first].mean(), load - load[first].mean()
+    return (stroke, load) if options.toe is None else _from_contact(stroke, load, options.toe)
 
 
-def _from_contact(way: Floats, load: Floats, toe: float) -> tuple[Floats, Floats]:
+def _from_contact(stroke: Floats, load: Floats, toe: float) -> tuple[Floats, Floats]:
     """Counts the displacement from where the line between the toe and twice as much meets zero.
 
     Contact is after the last reading below the toe that comes before the first of twice as much.
     """
     if not (load >= 2 * toe).any():
         raise ValueError(f"the force does not rise to {2 * toe:g} N")
-    risen = int(np.argmax(load >= 2 * toe))
-    below = np.flatnonzero(load[:risen] < toe)
+    doubled = int(np.argmax(load >= 2 * toe))
+    below = np.flatnonzero(load[:doubled] < toe)
     if not len(below):
         raise ValueError(f"the force begins above {toe:g} N")
-    felt = int(below[-1]) + 1
-    if (clear := CLEAR * _noise(load[: max(felt, LEAST_RESTING)])) > toe:
+    first = int(below[-1]) + 1
+    if (clear := TOE_SIGMAS * _noise(load[: max(first, LEAST_RESTING)])) > toe:
         raise ValueError(
             f"the toe of {toe:g} N is not clear of the force's noise before contact: give"
             f" {clear:.2g} N or more"
         )
-    ends = [_crossing(way, load, k, level) for k, level in ((felt, toe), (risen, 2 * toe))]
-    along = np.array([ends[0], *way[felt:risen], ends[1]])
+    ends = [_crossing(stroke, load, k, level) for k, level in ((first, toe), (doubled, 2 * toe))]
+    along = np.array([ends[0], *stroke[first:doubled], ends[1]])
     if along[-1] <= along[0]:
         raise ValueError(f"the force rises from {toe:g} N to {2 * toe:g} N without motion")
-    slope, offset = np.polyfit(along, np.array([toe, *load[felt:risen], 2 * toe]), 1)
-    return (way + offset / slope)[felt:], load[felt:]
+    slope, offset = np.polyfit(along, np.array([toe, *load[first:doubled], 2 * toe]), 1)
+    return (stroke + offset / slope)[first:], load[first:]
 
 
 def _noise(load: Floats) -> float:
@@ -185,7 +191,7 @@ def _noise(load: Floats) -> float:
     return MEDIAN_SIGMAS * float(np.median(bends)) / 6**0.5 if len(bends) else 0.0
 
 
-def _crossing(way: Floats, load: Floats, k: int, level: float) -> float:
+def _crossing(stroke: Floats, load: Floats, k: int, level: float) -> float:
     """Interpolates where the force passes a level between a reading and the one before."""
     part = (level - load[k - 1]) / (load[k] - load[k - 1])
-    return float(way[k - 1] + part * (way[k] - way[k - 1]))
+    return float(stroke[k - 1] + part * (stroke[k] - stroke[k - 1]))

@@ -28,27 +28,31 @@ from sim.structure import (
 )
 from sim.time_integration import ImplicitSolver, time_grid
 
-AnySolver = StaticSolver | ImplicitSolver
+ExperimentSolver = StaticSolver | ImplicitSolver
 
-Seen = Callable[[Numbers, Parameters], Array]
+Observation = Callable[[Numbers, Parameters], Array]
 """Readings of a motion (n_times, n_units, 3) of given parameters."""
 
 
-def _of_numbers(
+def _parameters_of(
     numbers: Array,
     lattice: LatticeArrays,
     made: Shape,
     density: Numbers,
     contact: Numbers,
-    stiffer: Numbers,
+    stiffness_factors: Numbers,
 ) -> Parameters[Array]:
     """Derives the parameters of a specimen from its numbers (5,)."""
     axial, shear, bending, translation, rotation = (numbers[k] for k in range(5))
-    stiffness = stiffer[:, 0] * axial, stiffer[:, 1] * shear, stiffer[:, 2] * bending
+    stiffness = (
+        stiffness_factors[:, 0] * axial,
+        stiffness_factors[:, 1] * shear,
+        stiffness_factors[:, 2] * bending,
+    )
     return parameters(lattice, made, Material(density, *stiffness, contact, translation, rotation))
 
 
-_OF_NUMBERS = ParameterMap(_of_numbers)
+_PARAMETERS = ParameterMap(_parameters_of)
 """Compiles once for all specimens of a size: what tells them apart is passed."""
 
 
@@ -60,24 +64,26 @@ class SpecimenSimulation:
     vertices: Floats  # (n_vertices, 2) as built, mm
     density: float  # tonne/mm^2
     contact: float  # stiffness, N mm/rad^2
-    solver: AnySolver  # of its motion
+    solver: ExperimentSolver  # of its motion
     drive: PrescribedMotion  # of its held units
-    seen: Seen  # what is measured of the motion
+    observe: Observation  # computes the readings of a motion
     # (n_ligaments, 3) or (1, 3) factor on axial, shear and bending stiffness
-    stiffer: Floats = field(default_factory=lambda: np.ones((1, 3)))
+    stiffness_factors: Floats = field(default_factory=lambda: np.ones((1, 3)))
 
     @cached_property
     def parameters(self) -> ParameterMap:
-        """Map from a specimen's numbers (5,) to what the solvers take."""
+        """Maps a specimen's numbers (5,) to the solvers' parameters."""
         lattice, made = arrays_of(self.lattice), shape(self.lattice, self.vertices)
-        return _OF_NUMBERS.passing(lattice, made, self.density, self.contact, self.stiffer)
+        return _PARAMETERS.passing(
+            lattice, made, self.density, self.contact, self.stiffness_factors
+        )
 
     @cached_property
-    def _compiled(self) -> Seen:
-        return jax.jit(self.seen)
+    def _compiled(self) -> Observation:
+        return jax.jit(self.observe)
 
     def predict(self, constants: Constants, drive: PrescribedMotion | None = None) -> Floats:
-        """(n,) what is measured of a specimen, under another drive if one is given.
+        """Predicts the readings (n,) of a specimen, under another drive if one is given.
 
         Raises:
             SimulationError: a step failed.
@@ -87,10 +93,10 @@ class SpecimenSimulation:
         motion, _, _ = solve_cases(self._solver(constants), concrete(made), cases)
         return np.asarray(self._compiled(motion[0], made))
 
-    def pulled_back(
+    def pull_back(
         self, constants: Constants, bar: Floats, drive: PrescribedMotion | None = None
     ) -> Floats:
-        """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint.
+        """Differentiates (5,) `bar @ predict` by the specimen's numbers, by the adjoint.
 
         Raises:
             SimulationError: a step failed, or an equilibrium is not stable.
@@ -102,10 +108,10 @@ class SpecimenSimulation:
             cases=(drive or self.drive,),
         )[1]
 
-    def pulled_to_drive(
+    def pull_back_to_drive(
         self, constants: Constants, bar: Floats, drive: PrescribedMotion | None = None
     ) -> MotionLaw:
-        """Derivatives of `bar @ predict` by the numbers of the drive's motion, by the adjoint.
+        """Differentiates `bar @ predict` by the numbers of the drive's motion, by the adjoint.
 
         Raises:
             SimulationError: a step failed, or an equilibrium is not stable.
@@ -113,11 +119,11 @@ class SpecimenSimulation:
         solver, made = self._solver(constants), self.parameters(constants.numbers)
         known = drive or self.drive
 
-        def seen(motion: MotionLaw) -> Array:
+        def observe(motion: MotionLaw) -> Array:
             drives = (PrescribedMotion(known.units, motion),)
-            return self.seen(differentiable_motion(solver, made, drives).displacement[0], made)
+            return self.observe(differentiable_motion(solver, made, drives).displacement[0], made)
 
-        return jax.vjp(seen, known.motion)[1](jnp.asarray(bar))[0]
+        return jax.vjp(observe, known.motion)[1](jnp.asarray(bar))[0]
 
     def finer(self) -> SpecimenSimulation:
         """Halves the steps in time; of equilibria there are none."""
@@ -129,11 +135,11 @@ class SpecimenSimulation:
     @cached_property
     def _chain(self) -> GradientChain:
         def weighted(motion: Array, made: Parameters[Array], bar: Array) -> tuple[Array, None]:
-            return jnp.vdot(bar, self.seen(motion[0], made)), None
+            return jnp.vdot(bar, self.observe(motion[0], made)), None
 
         return GradientChain(self.parameters, weighted)
 
-    def _solver(self, constants: Constants) -> AnySolver:
+    def _solver(self, constants: Constants) -> ExperimentSolver:
         if constants.cutoff is None:
             return self.solver
         topology = replace(self.solver.topology, contact=constants.law)

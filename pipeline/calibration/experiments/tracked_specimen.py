@@ -27,7 +27,7 @@ class TrackedSpecimen(NamedTuple):
 
     problem: Problem  # of the study
     scene: Scene  # of the structure, under the problem's drives
-    stiffer: Floats  # (n_ligaments, 3) factor on axial, shear and bending stiffness
+    stiffness_factors: Floats  # (n_ligaments, 3) factor on axial, shear and bending stiffness
 
     def vertices(self, track: xr.Dataset, path: Path) -> Floats:
         """Reads the vertices (n_vertices, 2) as built, mm.

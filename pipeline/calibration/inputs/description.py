@@ -28,7 +28,7 @@ ConstantName = Literal[
 TestKind = Literal["tension", "compression", "shear"]
 
 
-def _alike(lattice: Lattice) -> Lattice:
+def _check_same_stiffness(lattice: Lattice) -> Lattice:
     """Refuses ligaments with stiffnesses of their own: all are made of the same constants here."""
     listed = (isinstance(lattice, ListedNetwork) and lattice.stiffnesses) or ()
     if any(value is not None for own in listed for value in own):
@@ -37,7 +37,7 @@ def _alike(lattice: Lattice) -> Lattice:
     return lattice
 
 
-Specimen = Annotated[Lattice, AfterValidator(_alike)]
+Specimen = Annotated[Lattice, AfterValidator(_check_same_stiffness)]
 """Lattice whose ligaments are all of the same constants."""
 Label = Annotated[str, StringConstraints(pattern=r"^\w+$")]
 
@@ -239,13 +239,13 @@ class Calibration(Section):
     synthetic: bool = False
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        for what, remedy, key in _faults(self):
+    def _check_consistency(self) -> Self:
+        for what, remedy, key in _find_faults(self):
             raise fault(what, remedy, *key.split("."))
         return self
 
 
-def _faults(asked: Calibration) -> list[tuple[str, str, str]]:
+def _find_faults(asked: Calibration) -> list[tuple[str, str, str]]:
     """Checks the sections against one another: fault, remedy, key."""
     found = []
     names = [each.name for each in asked.data]
@@ -266,7 +266,7 @@ def _faults(asked: Calibration) -> list[tuple[str, str, str]]:
     if asked.contact is not None and asked.contact.law != "angle":
         remedy = "give contact of law: angle, or none"
         found.append(("contact by the law of distance is not known here", remedy, "contact"))
-    found += _start_faults(asked)
+    found += _find_start_faults(asked)
     computed = [each.virtual is not None for each in asked.data]
     if any(computed) != (asked.virtual is not None):
         remedy = "give virtual.truth with virtual sets, and only then"
@@ -274,7 +274,7 @@ def _faults(asked: Calibration) -> list[tuple[str, str, str]]:
     return found
 
 
-def _start_faults(asked: Calibration) -> list[tuple[str, str, str]]:
+def _find_start_faults(asked: Calibration) -> list[tuple[str, str, str]]:
     """Checks the values to start from, and the true ones: fault, remedy, key."""
     found = []
     for part in ("ratio", "translation", "rotation"):

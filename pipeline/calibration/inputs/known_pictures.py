@@ -58,7 +58,7 @@ class RigidParts(Section):
         return self.accuracy and (self.accuracy[0], *self.accuracy)
 
     @model_validator(mode="after")
-    def _told_apart(self) -> Self:
+    def _check_names(self) -> Self:
         names = [each.name for each in self.parts]
         if len(set(names)) < len(names):
             raise fault("two parts have one name", "name each part differently", "parts")

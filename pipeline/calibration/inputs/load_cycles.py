@@ -27,7 +27,7 @@ class PathDrive(Section):
     file: File
 
     @model_validator(mode="after")
-    def _two_units(self) -> Self:
+    def _check_units(self) -> Self:
         if self.held == self.driven:
             what = "the unit that moves is held"
             raise fault(what, "give the numbers of two units", "driven")
@@ -61,7 +61,7 @@ class CycleRecord(Section):
     known: File | None = None
 
     @model_validator(mode="after")
-    def _simulated(self) -> Self:
+    def _check_simulated(self) -> Self:
         if self.contact is not None and self.contact.law != "angle":
             remedy = "give contact of law: angle, or none"
             raise fault("contact by the law of distance is not known here", remedy, "contact")
@@ -92,7 +92,7 @@ class LoadCycles(Section):
     records: Annotated[tuple[CycleRecord, ...], Field(min_length=1)]
 
     @model_validator(mode="after")
-    def _units_of_the_lattice(self) -> Self:
+    def _check_lattice(self) -> Self:
         count = self.lattice.n_units
         for name in ("held", "driven"):
             if (unit := getattr(self.drive, name)) >= count:

@@ -33,7 +33,7 @@ def source_files(asked: Calibration, folder: Path) -> dict[str, Path]:
 
 
 def has_synthetic(sets: Iterable[MeasurementSet | SampleTest | CycleRecord], folder: Path) -> bool:
-    """Tells whether any set in a folder was rendered or computed: its track or CSV says so.
+    """Tests whether any set in a folder was rendered or computed: its track or CSV says so.
 
     Raises:
         UserError: a file cannot be read.

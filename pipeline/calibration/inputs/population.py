@@ -54,7 +54,7 @@ class SampleTest(Section):
     record: RecordOptions | None = None
 
     @model_validator(mode="after")
-    def _in_direction(self) -> Self:
+    def _check_direction(self) -> Self:
         check_reversed(self.file, self.record)
         return self
 
@@ -155,7 +155,7 @@ class Population(Section):
         return tuple(sorted({name for each in self.data for name in each.samples}))
 
     @model_validator(mode="after")
-    def _apart(self) -> Self:
+    def _check_samples(self) -> Self:
         names = [each.name for each in self.data]
         if len(set(names)) < len(names):
             raise fault("two sets are of one test and sample", "join their files", "data")

@@ -25,7 +25,7 @@ REACH = ((-2.5, 4.5), (-1.0, 1.0))
 ORDERS = (9, 5)
 STEPS = 24
 """Loads of a curve."""
-TRIALS = 40
+TEST_POINTS = 40
 
 
 class CurveEmulator(NamedTuple):
@@ -98,7 +98,7 @@ def emulate(
         for node, order in zip(nodes, ORDERS, strict=True)
     ]
     coefficients = np.einsum("ai,bj,ijn->abn", *inverses, values)
-    trials = np.random.default_rng(seed).uniform(-1, 1, (TRIALS, 2))
+    trials = np.random.default_rng(seed).uniform(-1, 1, (TEST_POINTS, 2))
     found = [chebyshev.chebval2d(place[0], place[1], coefficients) for place in trials]
     wrong = np.abs(np.array(found) - [scaled(place) for place in trials]).max()
     return CurveEmulator(displacement, ratios, coefficients, float(np.expm1(wrong)))

@@ -31,9 +31,9 @@ from pipeline.calibration.inputs import Priors
 from pipeline.calibration.population.curve_emulator import log_force
 from sim.core import Floats, Numbers
 
-LENGTH = 0.5
+CORRELATION_LENGTH = 0.5
 """Of the Gaussian processes, over the range of a test's displacements."""
-DEEPEST = 7
+MAX_TREE_DEPTH = 7
 """Doublings of a trajectory of the sampler, at most."""
 PAUSE = 0.05
 """Seconds between two looks at a sampler that runs."""
@@ -82,7 +82,7 @@ class Readings(NamedTuple):
 def correlation(place: Numbers) -> Array:
     """Correlates (n, n) the values of a Gaussian process: exp(-(u - u')^2 / 2 l^2)."""
     at = jnp.asarray(place)
-    return jnp.exp(-(((at[:, None] - at) / LENGTH) ** 2) / 2)
+    return jnp.exp(-(((at[:, None] - at) / CORRELATION_LENGTH) ** 2) / 2)
 
 
 class PriorNumbers(NamedTuple):
@@ -142,14 +142,14 @@ def sample_posteriors(
         mean, spread (n_sets, draws, 3), constants (n_sets, draws, n_samples, 3), discrepancy
         (n_sets, draws), mounting and reading (n_sets, draws, n_kinds), diverging (n_sets, draws).
     """
-    run = jax.jit(partial(_walks, warm_up=warm_up, draws=draws))
+    run = jax.jit(partial(_run_chains, warm_up=warm_up, draws=draws))
     found = run(readings, priors, jax.random.split(jax.random.PRNGKey(seed), len(readings.used)))
     while not all(values.is_ready() for values in found.values()):
         sleep(PAUSE)  # a wait within JAX would let no Ctrl-C in
     return {name: np.asarray(values) for name, values in found.items()}
 
 
-def _walks(
+def _run_chains(
     readings: Readings, priors: PriorNumbers, keys: Array, *, warm_up: int, draws: int
 ) -> dict[str, Array]:
     of_set = Readings(0, 0, None, None, None, None, None)  # type: ignore[arg-type]
@@ -159,7 +159,7 @@ def _walks(
             hierarchical_model,
             target_accept_prob=0.9,
             dense_mass=True,
-            max_tree_depth=DEEPEST,
+            max_tree_depth=MAX_TREE_DEPTH,
             init_strategy=init_to_median(num_samples=5),
         )
         state = kernel.init(key, warm_up, None, (seen, given), {})

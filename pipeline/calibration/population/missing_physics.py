@@ -1,4 +1,4 @@
-"""Ranks physics that the model leaves out by how much of a residual each would explain.
+"""Ranks mechanisms that the model leaves out by the share of a residual that each explains.
 
 A small term e(x) added to the energy changes the force over the displacement s of the grips by
 de(x(s))/ds along the equilibria x(s) without it, as these are stationary; a drag or friction adds
@@ -60,7 +60,7 @@ def follow_test(specimen: Lattice, test: TestKind, constants: Constants, end: fl
     displacement = end * np.arange(1, STEPS + 1) / STEPS
     posed = force_displacement.pose_simulation(specimen, test, constants, displacement)
     force = posed.predict(constants)
-    motion = replace(posed, seen=_itself).predict(constants)
+    motion = replace(posed, observe=_identity).predict(constants)
     made = posed.parameters(constants.numbers)
     pairs = posed.lattice.ligament_units
 
@@ -76,7 +76,7 @@ def follow_test(specimen: Lattice, test: TestKind, constants: Constants, end: fl
     return TestPath(length, np.r_[0.0, displacement], np.r_[0.0, force], whole, *found, *rest)
 
 
-def _itself(motion: Numbers, _: Parameters) -> Array:
+def _identity(motion: Numbers, _: Parameters) -> Array:
     return jnp.asarray(motion)
 
 
@@ -97,27 +97,27 @@ def _weight(path: TestPath) -> Floats:
     return pull - pull[0]
 
 
-def _drag(path: TestPath) -> Floats:
+def _viscous_drag(path: TestPath) -> Floats:
     return 1.0 * ((path.slope(path.motion) ** 2) * path.damping).sum(axis=(1, 2))
 
 
-def _bent_at_rest(path: TestPath) -> Floats:
+def _initial_curvature(path: TestPath) -> Floats:
     """Computes the root mean square over random signs: 3 deg at every ligament."""
     each = path.law[:, 2] * np.deg2rad(3.0) * path.slope(path.bend)
     return np.asarray(np.sqrt((each**2).sum(axis=1)))
 
 
-def _harder_in_bending(path: TestPath) -> Floats:
+def _stiffening_bending(path: TestPath) -> Floats:
     """Makes bending stiffer by a tenth at 0.3 rad: k_b (1 + 0.1 (bend / 0.3)^2)."""
     return 0.1 / 0.3**2 * path.slope((path.bend**4) @ path.law[:, 2] / 4)
 
 
-def _softer_ends(path: TestPath) -> Floats:
-    """Takes by 1 um/N of the fixture from what the specimen is compressed by."""
+def _compliant_fixture(path: TestPath) -> Floats:
+    """Subtracts the fixture's compliance, 1 um/N, from the specimen's compression."""
     return -1e-3 * path.force * path.slope(path.force)
 
 
-def _later_start(path: TestPath) -> Floats:
+def _offset_start(path: TestPath) -> Floats:
     return 0.05 * path.slope(path.force)
 
 
@@ -129,12 +129,12 @@ def _shear_stretch(path: TestPath) -> Floats:
 MECHANISMS = (
     Mechanism("friction of the units on a plate", "coefficient 0.3", _friction),
     Mechanism("weight in the plane of the specimen", "hung upright", _weight),
-    Mechanism("viscosity", "damping ratio of the paper, 1 mm/s", _drag),
-    Mechanism("shims bent at rest", "3 deg, random sign", _bent_at_rest),
-    Mechanism("shims stiffer when bent far", "10 % at 0.3 rad", _harder_in_bending),
+    Mechanism("viscosity", "damping ratio of the paper, 1 mm/s", _viscous_drag),
+    Mechanism("shims bent at rest", "3 deg, random sign", _initial_curvature),
+    Mechanism("shims stiffer when bent far", "10 % at 0.3 rad", _stiffening_bending),
     Mechanism("stretch of shims sheared far", "1 % of the axial constant", _shear_stretch),
-    Mechanism("compliance of slots and fixture", "0.001 mm/N", _softer_ends),
-    Mechanism("start of the test read late", "0.05 mm, in all tests", _later_start),
+    Mechanism("compliance of slots and fixture", "0.001 mm/N", _compliant_fixture),
+    Mechanism("start of the test read late", "0.05 mm, in all tests", _offset_start),
 )
 
 
@@ -179,13 +179,13 @@ def rank_mechanisms(
     for mechanism in MECHANISMS:
         pairs = zip(fitted, slopes.fitted, strict=True)
         seen = [
-            _relative(
+            _relative_change(
                 mechanism, path, path.displacement[-1] * np.arange(1, len(each) + 1) / len(each)
             )
             for path, each in pairs
         ]
         taken, *_ = np.linalg.lstsq(np.concatenate(slopes.fitted), np.concatenate(seen), rcond=1e-3)
-        alone = _relative(mechanism, predicted, displacement)
+        alone = _relative_change(mechanism, predicted, displacement)
         change = alone - slopes.predicted @ taken
         found.append(_ranked(mechanism.name, mechanism.size, change, alone, residual))
     return sorted(found, key=lambda each: -each.explained)
@@ -204,7 +204,7 @@ def _ranked(
     return RankedMechanism(name, size, change, float(explained), float(only), float(wanted))
 
 
-def _relative(mechanism: Mechanism, path: TestPath, displacement: Floats) -> Floats:
+def _relative_change(mechanism: Mechanism, path: TestPath, displacement: Floats) -> Floats:
     """Computes changes of the logarithm of a force at displacements in mm."""
     whole = mechanism.change(path)[1:] / path.force[1:]
     return np.interp(displacement, path.displacement[1:], whole)

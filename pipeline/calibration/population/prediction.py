@@ -44,7 +44,7 @@ class PredictionBand(NamedTuple):
         return float((self.high - self.low).mean() / 2)
 
     def holds(self, log_force: Floats) -> Floats:
-        """Tells of curves (..., n) whether each lies inside as a whole."""
+        """Tests whether each curve (..., n) lies inside as a whole."""
         return np.asarray(((log_force >= self.low) & (log_force <= self.high)).all(axis=-1))
 
 
@@ -111,7 +111,7 @@ def redraw_population(
     mean = mean + np.sqrt(known / count) * spread * random.normal(size=spread.shape)
     made = {"mean": mean, "spread": spread}
     flat = {name: np.moveaxis(each, 2, 1).reshape(-1, 3) for name, each in made.items()}
-    return {name: np.repeat(draws[name], repeats, axis=0) for name in _DRAWN} | flat
+    return {name: np.repeat(draws[name], repeats, axis=0) for name in _POSTERIOR_NAMES} | flat
 
 
 def new_curves(
@@ -134,7 +134,7 @@ def new_curves(
     Returns:
         (n * repeats, n_points) logarithms of forces.
     """
-    repeated = {name: np.repeat(draws[name], repeats, axis=0) for name in _DRAWN}
+    repeated = {name: np.repeat(draws[name], repeats, axis=0) for name in _POSTERIOR_NAMES}
     logs = repeated["mean"] + repeated["spread"] * random.normal(size=repeated["mean"].shape)
     if sample is not None:
         logs = repeated["constants"][:, sample]
@@ -146,7 +146,7 @@ def new_curves(
     return np.asarray(curve.predict(logs) + common + scale[2][:, [curve.kind]] * read)
 
 
-_DRAWN = ("mean", "spread", "constants", "discrepancy", "mounting", "reading")
+_POSTERIOR_NAMES = ("mean", "spread", "constants", "discrepancy", "mounting", "reading")
 
 
 def find_band(curves: Floats) -> PredictionBand:
@@ -173,7 +173,7 @@ def student_band(curve: PosedCurve, constants: Floats) -> PredictionBand:
 
 def medians(draws: Draws) -> Mapping[str, Floats]:
     """Takes medians over the draws of one posterior."""
-    return {name: np.median(draws[name], axis=0) for name in _DRAWN}
+    return {name: np.median(draws[name], axis=0) for name in _POSTERIOR_NAMES}
 
 
 class Coverage(NamedTuple):
@@ -183,7 +183,7 @@ class Coverage(NamedTuple):
     width: Floats  # of the band, over that of Student's interval of the same samples
 
 
-def try_band(
+def simulate_coverage(
     readings: Readings,
     priors: PriorNumbers,
     curve: PosedCurve,

@@ -41,8 +41,8 @@ from pipeline.calibration.population.prediction import (
     new_curves,
     pose_curve,
     redraw_population,
+    simulate_coverage,
     student_band,
-    try_band,
 )
 from pipeline.calibration.population.sample_readings import (
     SampleCurve,
@@ -95,10 +95,10 @@ def validate_population(asked: Population, folder: Path) -> xr.Dataset:
     at = np.linspace(shown.displacement[0], shown.displacement[-1], POINTS)
     force = np.interp(at, shown.displacement, shown.force)
     check_forces(asked.predict, folder, at, force)
-    curves, emulators = _emulated(asked, folder, begin)
+    curves, emulators = _emulate_curves(asked, folder, begin)
     predicted = emulate(asked.predict.lattice, asked.predict.test, begin, end)
     readings, names = stack_readings(curves, emulators, asked.samples, asked.points)
-    posteriors = _fits(asked, begin.logs(ELASTIC_NAMES), readings, names)
+    posteriors = _sample_fits(asked, begin.logs(ELASTIC_NAMES), readings, names)
     found = FittedPopulation(asked, curves, emulators, predicted, readings, names, posteriors)
     kinds = list(emulators)
     curve = pose_curve(predicted, at, kinds.index(asked.predict.test))
@@ -109,17 +109,17 @@ def validate_population(asked: Population, folder: Path) -> xr.Dataset:
         drawn[name] = redraw_population(posteriors[name], prior_numbers(given, centre), random)
         bands[name] = find_band(new_curves(curve, drawn[name], random))
     truth = np.log(force)
-    ranked = _ranked(found, begin, curve, truth - bands[""].median)
+    ranked = _rank_mechanisms(found, begin, curve, truth - bands[""].median)
     priors = prior_numbers(asked.priors, centre)
-    covered = try_band(readings, priors, curve, middle, asked.sampling)
+    covered = simulate_coverage(readings, priors, curve, middle, asked.sampling)
     variables = {
-        **_constants(found),
+        **_constant_variables(found),
         "emulator_beyond": ((), share_beyond(predicted.centre, posteriors[""]["constants"])),
         "emulator_beyond_predicted": ((), share_beyond(predicted.centre, _new_samples(drawn[""]))),
-        **_predictions(found, curve, bands, truth, folder),
-        **_mechanisms(ranked),
-        **_left_out(found, random),
-        **_points(found),
+        **_prediction_variables(found, curve, bands, truth, folder),
+        **_mechanism_variables(ranked),
+        **_leave_one_out(found, random),
+        **_point_variables(found),
         "covered": ("simulated_set", covered.inside),
         "relative_width": ("simulated_set", covered.width),
         "factor": ("factor", FACTORS),
@@ -151,7 +151,7 @@ def draw_constants(asked: Population, folder: Path, count: int) -> Floats:
             what, remedy = "no constants are drawn", "ask for one or more"
         raise UserError(what, key="count", value=count, remedy=remedy)
     begin = Constants(asked.material, None, asked.spacing)
-    curves, emulators = _emulated(asked, folder, begin)
+    curves, emulators = _emulate_curves(asked, folder, begin)
     readings, _ = stack_readings(curves, emulators, asked.samples, asked.points)
     priors = prior_numbers(asked.priors, begin.logs(ELASTIC_NAMES))
     chains = asked.sampling.chains
@@ -174,7 +174,7 @@ def _new_samples(draws: Draws) -> Floats:
     return np.asarray(draws["mean"] + draws["spread"] * random.normal(size=draws["mean"].shape))
 
 
-def _emulated(
+def _emulate_curves(
     asked: Population, folder: Path, begin: Constants
 ) -> tuple[list[SampleCurve], dict[TestKind, CurveEmulator]]:
     curves = [read_curve(each, asked.lattice, folder) for each in asked.data]
@@ -185,7 +185,7 @@ def _emulated(
     return curves, {kind: emulate(asked.lattice, kind, begin, far) for kind, far in reach.items()}
 
 
-def _fits(
+def _sample_fits(
     asked: Population, centre: Floats, readings: Readings, names: Sequence[Sequence[str]]
 ) -> dict[str, Draws]:
     """Samples at once the posteriors of everything, with doubled priors, with parts left out."""
@@ -219,7 +219,7 @@ def _slopes(weights: Floats, ratios: Floats, displacement: Floats, logs: Floats)
     )
 
 
-def _ranked(
+def _rank_mechanisms(
     found: FittedPopulation, begin: Constants, curve: PosedCurve, residual: Floats
 ) -> list[RankedMechanism]:
     asked, middle = found.asked, medians(found.posteriors[""])
@@ -238,8 +238,8 @@ def _ranked(
     return rank_mechanisms(paths, path, slopes, spread, curve.displacement, residual)
 
 
-def _constants(found: FittedPopulation) -> dict[str, tuple]:
-    """Tells the posterior of means, spreads, samples and errors by quantiles."""
+def _constant_variables(found: FittedPopulation) -> dict[str, tuple]:
+    """Computes quantiles of the posterior of means, spreads, samples and errors."""
     draws = found.posteriors[""]
     logs = np.quantile(draws["mean"], QUANTILES, axis=0)
     chains = [
@@ -267,19 +267,21 @@ def _constants(found: FittedPopulation) -> dict[str, tuple]:
     }
 
 
-def _predictions(
+def _prediction_variables(
     found: FittedPopulation,
     curve: PosedCurve,
     bands: Mapping[str, PredictionBand],
     truth: Floats,
     folder: Path,
 ) -> dict[str, tuple]:
-    """Tells the prediction beside the measured curve and the one that others simulated."""
+    """Assembles the prediction, the measured curve and the one that others simulated."""
     asked, at = found.asked.predict, curve.displacement
     theirs = np.full(len(at), np.nan)
     if asked.simulated is not None:
         wanted = {asked.columns.displacement: units.LENGTH, asked.columns.force: units.FORCE}
-        theirs = within(at, csv_columns.read_quantities(folder / asked.simulated, wanted))
+        theirs = interpolate_curve(
+            at, csv_columns.read_quantities(folder / asked.simulated, wanted)
+        )
     along = ("predicted",)
     own, doubled, student = (bands[name] for name in ("", "doubled", "student"))
     return {
@@ -299,13 +301,13 @@ def _predictions(
     }
 
 
-def within(at: Floats, curve: Floats) -> Floats:
+def interpolate_curve(at: Floats, curve: Floats) -> Floats:
     """Interpolates a curve (lines, 2) of displacement and force, NaN beyond its ends."""
     displacement, force = curve.T
     return np.interp(at, displacement, force, left=np.nan, right=np.nan)
 
 
-def _mechanisms(ranked: Sequence[RankedMechanism]) -> dict[str, tuple]:
+def _mechanism_variables(ranked: Sequence[RankedMechanism]) -> dict[str, tuple]:
     each = ("mechanism",)
     return {
         "mechanism": (each, [one.name for one in ranked]),
@@ -317,7 +319,7 @@ def _mechanisms(ranked: Sequence[RankedMechanism]) -> dict[str, tuple]:
     }
 
 
-class _LeftOutCurve(NamedTuple):
+class _HeldOutCurve(NamedTuple):
     without: str
     curve: str
     inside: bool
@@ -325,10 +327,10 @@ class _LeftOutCurve(NamedTuple):
     deviation: float
 
 
-def _left_out(found: FittedPopulation, random: np.random.Generator) -> dict[str, tuple]:
+def _leave_one_out(found: FittedPopulation, random: np.random.Generator) -> dict[str, tuple]:
     """Predicts every sample's own curves from fits without it, and without its kind of test."""
     told = [
-        _predicted(found, without, single, random)
+        _predict_left_out(found, without, single, random)
         for without in found.posteriors
         for single in found.curves
         if len(single.samples) == 1 and without in (single.samples[0], single.test)
@@ -343,9 +345,9 @@ def _left_out(found: FittedPopulation, random: np.random.Generator) -> dict[str,
     }
 
 
-def _predicted(
+def _predict_left_out(
     found: FittedPopulation, without: str, single: SampleCurve, random: np.random.Generator
-) -> _LeftOutCurve:
+) -> _HeldOutCurve:
     emulator, kind = found.emulators[single.test], list(found.emulators).index(single.test)
     thin = single.thinned(float(emulator.displacement[-1]), found.asked.points)
     curve = pose_curve(emulator, thin.displacement, kind)
@@ -354,11 +356,11 @@ def _predicted(
     band = find_band(drawn)
     truth = np.log(thin.force)
     deviation = float((truth - band.median).mean())
-    return _LeftOutCurve(without, single.name, bool(band.holds(truth)), band.half_width, deviation)
+    return _HeldOutCurve(without, single.name, bool(band.holds(truth)), band.half_width, deviation)
 
 
-def _points(found: FittedPopulation) -> dict[str, tuple]:
-    """Tells every reading of the fit, and the curves of the samples' median constants."""
+def _point_variables(found: FittedPopulation) -> dict[str, tuple]:
+    """Assembles every reading of the fit, and the curves of the samples' median constants."""
     logs = medians(found.posteriors[""])["constants"]
     made = [pose_curve(each, each.displacement, 0) for each in found.emulators.values()]
     used = found.readings.used > 0

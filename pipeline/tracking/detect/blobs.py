@@ -11,20 +11,20 @@ from pipeline.tracking.detect.lattice_votes import Placement, locate_lattice
 from pipeline.tracking.geometry import Camera, SpecimenOutlines, fit_camera, fit_homography
 from sim.core import Floats, Image, Ints, Mask
 
-_UPRIGHT = 10  # deg
-_NEARLY, _MOST = 0.95, 0.75
+_LEAST_TURN = 10  # deg
+_EQUIVALENT, _SUFFICIENT = 0.95, 0.75
 """Scores, over the number of units: of ways to see it that are as good; after which to look no
 further."""
-_SHARES = (0.95, 0.8, 0.67, 0.56, 0.47, 0.39, 0.32, 0.27, 0.22, 1.15)
+_RELATIVE_SCALES = (0.95, 0.8, 0.67, 0.56, 0.47, 0.39, 0.32, 0.27, 0.22, 1.15)
 """Sizes of a specimen of unknown scale, over the largest at which all of it is in the picture."""
-_AREA = 3.0
+_AREA_RATIO = 3.0
 """A camera that makes units so many times larger or smaller than told sees something else."""
 _BLOB_SIGMA = 0.2
-_DOT = 0.25
+_MARK_WIDTH = 0.25
 """Width of a median that a mark on a face does not survive, pitches."""
-_OTHER = 0.35
+_ORIENTATION_DIFFERENCE = 0.35
 """Orientations that differ by so much are others, rad."""
-_ASIDE = 0.5
+_PLACE_DIFFERENCE = 0.5
 """Distance of places that are others, pitches."""
 _MOST_SHIFTS = 24
 """Places along the lattice that are tried of one of which a part is seen."""
@@ -32,11 +32,11 @@ _SMALLEST = 0.25
 """Least area of a patch, over that of a unit: at the rim of a wide picture they are small."""
 _MARGIN = 1.0
 """A unit nearer to the rim of the picture is not expected to be a patch of its own, radii."""
-_SMOOTH = 32
+_SHADING_PIXELS = 32
 """Pixels a pitch that shades about a unit need at most."""
-_BLANK = 0.25  # of the contrast: what differs more from a face's own shade is a mark
-_MARKED = 0.02  # of a face
-_DOTS = 4
+_MARK_CONTRAST = 0.25  # of the contrast: what differs more from a face's own shade is a mark
+_MARKED_AREA = 0.02  # of a face
+_MOST_DOTS = 4
 
 
 @dataclass(frozen=True)
@@ -65,16 +65,16 @@ def specimen_orientation(camera: Camera) -> tuple[float, bool]:
     return turn, bool(np.linalg.det(camera.homography[:2, :2]) > 0)
 
 
-def turned_alike(turn: float, other: float) -> bool:
-    """Tells whether two angles, rad, are of one orientation."""
-    return bool(abs(np.angle(np.exp(1j * (turn - other)))) < _OTHER)
+def same_orientation(turn: float, other: float) -> bool:
+    """Tests whether two angles, rad, are of one orientation."""
+    return bool(abs(np.angle(np.exp(1j * (turn - other)))) < _ORIENTATION_DIFFERENCE)
 
 
 def orientation_text(camera: Camera) -> str:
     """Describes the orientation: upright, turned, seen from behind."""
     turn, behind = specimen_orientation(camera)
     degrees = round(float(np.rad2deg(turn)))
-    words = f"turned by {degrees} deg" if abs(degrees) > _UPRIGHT else "upright"
+    words = f"turned by {degrees} deg" if abs(degrees) > _LEAST_TURN else "upright"
     return f"{words} and mirrored, as from behind" if behind else words
 
 
@@ -102,46 +102,46 @@ def detect_lattice(
         same turned, and one of which a part is seen, a unit aside. Upright comes first, mirrored
         last. Their cameras are without distortion.
     """
-    scales = [px_per_mm] if px_per_mm else _scales(image, specimen)
+    scales = [px_per_mm] if px_per_mm else _candidate_scales(image, specimen)
     found: list[LatticeDetection] = []
     for marked in (True, False):
         for scale in scales:
-            shown = image if marked else _unmarked(image, specimen.pitch * scale)
+            shown = image if marked else _remove_marks(image, specimen.pitch * scale)
             for bright in (True, False):
-                found = max(found, _detections(shown, specimen, scale, bright), key=_score)
-            if _score(found) > _MOST * specimen.count:
+                found = max(found, _match(shown, specimen, scale, bright), key=_best_score)
+            if _best_score(found) > _SUFFICIENT * specimen.count:
                 break
-        if _score(found) > _MOST * specimen.count:
+        if _best_score(found) > _SUFFICIENT * specimen.count:
             break
-    least = _score(found) - (1 - _NEARLY) * specimen.count
+    least = _best_score(found) - (1 - _EQUIVALENT) * specimen.count
     return [one for one in found if one.score >= least]
 
 
-def _scales(image: Picture, specimen: SpecimenOutlines) -> list[float]:
-    """Lists pixels per mm at which to look; last those at which it fits only a quarter turned."""
+def _candidate_scales(image: Picture, specimen: SpecimenOutlines) -> list[float]:
+    """Lists candidate scales, px per mm; last those at which it fits only a quarter turned."""
     extent = np.ptp(specimen.centre, axis=0) + 2 * specimen.radius.mean()
     upright, turned = (
         min(image.shape[1] / wide, image.shape[0] / high) for wide, high in (extent, extent[::-1])
     )
-    scales = [float(upright * share) for share in _SHARES]
-    return scales + [turned * share for share in _SHARES if turned * share > max(scales)]
+    scales = [float(upright * share) for share in _RELATIVE_SCALES]
+    return scales + [turned * share for share in _RELATIVE_SCALES if turned * share > max(scales)]
 
 
-def _score(ways: list[LatticeDetection]) -> int:
+def _best_score(ways: list[LatticeDetection]) -> int:
     return max((one.score for one in ways), default=-(10**9))
 
 
-def _unmarked(image: Picture, pitch: float) -> Image:
+def _remove_marks(image: Picture, pitch: float) -> Image:
     """Removes dots and speckle, which may stand out more than the faces themselves."""
-    width = int(_DOT * pitch) | 1
+    width = int(_MARK_WIDTH * pitch) | 1
     return np.asarray(cv2.medianBlur(np.clip(image, 0, 255).astype(np.uint8), width), np.uint8)
 
 
-def _detections(
+def _match(
     image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool
 ) -> list[LatticeDetection]:
     """Returns matches, at least one, that differ in orientation or place; mirrored ones last."""
-    patches, cut = _blobs(image, specimen, scale, bright)
+    patches, cut = _segment(image, specimen, scale, bright)
     size = (image.shape[1], image.shape[0])
     camera = Camera(np.eye(3), (np.array(size) - 1) / 2, np.zeros(2), size)
     nothing = LatticeDetection(
@@ -165,7 +165,7 @@ def _detections(
             matrix = fit_homography(specimen.centre[one.unit], patches[one.patch])
             seen = replace(camera, homography=matrix)
             areas = np.abs(np.linalg.det(seen.jacobian(specimen.centre[one.unit]))) / scale**2
-            if areas.min() > 1 / _AREA and areas.max() < _AREA:
+            if areas.min() > 1 / _AREA_RATIO and areas.max() < _AREA_RATIO:
                 found.append(
                     (
                         side < 0,
@@ -177,7 +177,7 @@ def _detections(
                             blob=patches[one.patch],
                             missing=one.missing,
                             surplus=one.surplus,
-                            unexplained=_unexplained(cut, one, specimen.pitch * scale),
+                            unexplained=_count_unexplained(cut, one, specimen.pitch * scale),
                         ),
                     )
                 )
@@ -185,18 +185,18 @@ def _detections(
 
 
 def _same_place(one: Placement, other: Placement, pitch: float) -> bool:
-    """Tells whether two placements have one orientation, and units in the same places."""
-    if not turned_alike(one.turn, other.turn):
+    """Tests whether two placements have one orientation, and units in the same places."""
+    if not same_orientation(one.turn, other.turn):
         return False
     apart = np.linalg.norm(one.place - other.place, axis=1)
-    return bool(np.median(apart) < _ASIDE * pitch)
+    return bool(np.median(apart) < _PLACE_DIFFERENCE * pitch)
 
 
-def _unexplained(cut: Floats, placed: Placement, pitch: float) -> int:
+def _count_unexplained(cut: Floats, placed: Placement, pitch: float) -> int:
     """Counts blobs that the rim cuts (n, 2), px, and that are no unit's."""
     if not len(cut):
         return 0
-    return int((cdist(cut, placed.place).min(axis=1) > _ASIDE * pitch).sum())
+    return int((cdist(cut, placed.place).min(axis=1) > _PLACE_DIFFERENCE * pitch).sum())
 
 
 def with_distortion(specimen: SpecimenOutlines, detection: LatticeDetection) -> LatticeDetection:
@@ -208,10 +208,10 @@ def with_distortion(specimen: SpecimenOutlines, detection: LatticeDetection) -> 
 
 def find_blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool) -> Floats:
     """Returns centroids (n, 2) in px of patches of a unit's size that the rim does not cut."""
-    return _blobs(image, specimen, scale, bright)[0]
+    return _segment(image, specimen, scale, bright)[0]
 
 
-def _blobs(
+def _segment(
     image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool
 ) -> tuple[Floats, Floats]:
     """Returns centroids, px, of patches of a unit's size: whole ones (n, 2), and cut ones."""
@@ -219,7 +219,7 @@ def _blobs(
     window = int(pitch * 2) | 1
     signed = image.astype(np.float32) * (1 if bright else -1)
     grey = cv2.GaussianBlur(signed, (0, 0), max(0.02 * pitch, 0.5))
-    few = max(1, int(pitch / _SMOOTH))  # what is local is so over pitches
+    few = max(1, int(pitch / _SHADING_PIXELS))  # what is local is so over pitches
     window = window // few | 1
     low, high = (
         change(grey[::few, ::few], np.ones((window, window), np.uint8))
@@ -230,7 +230,7 @@ def _blobs(
     middle = cv2.blur((low + high) / 2, (window, window))
     middle, contrast = (cv2.resize(each, grey.shape[::-1]) for each in (middle, contrast))
     mask = ((grey > middle) & (contrast > least)).astype(np.uint8)
-    filled = _filled(mask, 0.3 * float(np.median(specimen.area)) * scale**2)
+    filled = _fill_holes(mask, 0.3 * float(np.median(specimen.area)) * scale**2)
     size = max(int(0.12 * pitch) | 1, 3)
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     opened = cv2.morphologyEx(filled, cv2.MORPH_OPEN, kernel)
@@ -244,7 +244,7 @@ def _blobs(
     return places[good & whole], places[good & ~whole]
 
 
-def _filled(mask: Image, largest: float) -> Image:
+def _fill_holes(mask: Image, largest: float) -> Image:
     """Fills holes of the mask smaller than ``largest`` px: dots and speckle."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(1 - mask, connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] < largest
@@ -260,15 +260,15 @@ def classify_markings(
     The number of patches on them tells that differ from their own shade.
     """
     contrast = float(np.subtract(*np.percentile(image, [95, 5])))
-    counts = [_marks(image, specimen, detection, unit, contrast) for unit in detection.unit]
+    counts = [_count_marks(image, specimen, detection, unit, contrast) for unit in detection.unit]
     usual = float(np.median(counts))
     if usual < 1:
         return "bare"
-    small = px_per_mm * specimen.pitch < 3 * _DOTS  # px: no dots can be told apart
-    return "speckle" if usual > _DOTS or small else "dots"
+    small = px_per_mm * specimen.pitch < 3 * _MOST_DOTS  # px: no dots can be told apart
+    return "speckle" if usual > _MOST_DOTS or small else "dots"
 
 
-def _marks(
+def _count_marks(
     image: Picture,
     specimen: SpecimenOutlines,
     detection: LatticeDetection,
@@ -285,7 +285,7 @@ def _marks(
     mask = np.zeros(area.shape, np.uint8)
     cv2.fillPoly(mask, [polygon - [max(left, 0), max(top, 0)]], 1)
     face = np.median(area[mask > 0]) if mask.any() else 0.0
-    differs = ((np.abs(area - face) > _BLANK * contrast) & (mask > 0)).astype(np.uint8)
-    if differs.sum() < _MARKED * mask.sum():
+    differs = ((np.abs(area - face) > _MARK_CONTRAST * contrast) & (mask > 0)).astype(np.uint8)
+    if differs.sum() < _MARKED_AREA * mask.sum():
         return 0
     return int(cv2.connectedComponents(differs, connectivity=8)[0]) - 1

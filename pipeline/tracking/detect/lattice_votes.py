@@ -19,25 +19,25 @@ from scipy.spatial.distance import cdist
 
 from sim.core import Floats, Ints, Mask
 
-_LEAST = 6
+_LEAST_MATCHES = 6
 _ANGLE_BINS = 72
-_STRETCH = 0.3
+_LOG_SIZE = 0.3
 """Logarithm of the size of a pair of neighbours over that of joined units, at most."""
-_JOINTS = 64
-_BIN, _NEAR, _GATE = 0.25, 0.3, 0.35
+_MOST_JOINTS = 64
+_BIN_WIDTH, _NEAR, _GATE = 0.25, 0.3, 0.35
 """Width of a bin of shifts; distance of a patch from a unit at first and in growth; in pitches."""
-_FRONTIER = 1.7
+_GROWTH_REACH = 1.7
 """Units are reached from matches so far, over the length of a joint, or of the widest gap."""
 _TURNS_KEPT, _SHIFTS_KEPT = 0.6, 0.75
 """Votes of further candidates, over those of the best."""
 _MOST_SHIFTS, _MOST_SEEDS = 256, 3
-_AS_MANY = 0.95
+_EQUIVALENT = 0.95
 """Matches of further seeds, over those of the best, where more than usual are asked for."""
-_SURE = 0.98
+_SUFFICIENT = 0.98
 """Score, over the number of units, after which no other shift is tried."""
 _NEAREST, _RIDGE = 8, 0.05
 _ROUNDS = 80
-_BESIDE, _APART = 1.55, 0.6
+_FARTHEST, _NEAREST_DISTANCE = 1.55, 0.6
 """Distance of neighbours, diagonal ones too, between these, pitches."""
 
 Inside = Callable[[Floats], Mask]
@@ -79,33 +79,34 @@ def locate_lattice(
         most_turn: the largest angle to look for, rad.
         most_seeds: largest number of places to start from, of a turn, that match as much.
     """
-    if len(patches) < _LEAST or len(points) < _LEAST:
+    if len(patches) < _LEAST_MATCHES or len(points) < _LEAST_MATCHES:
         return []
     ends = points[joint]
     vectors = (ends[:, 1] - ends[:, 0]) @ np.array([1, 1j])
     pitch = scale * float(np.median(np.abs(vectors)))
     gap = float(minimum_spanning_tree(cdist(points, points)).max())
     joined = float(np.median(np.ptp(ends, axis=1).max(axis=1)))
-    reach = _FRONTIER * joined, _FRONTIER * max(joined, gap)
+    reach = _GROWTH_REACH * joined, _GROWTH_REACH * max(joined, gap)
     found: list[Placement] = []
-    for factor in _linear_factors(vectors, patches, scale, pitch, most_turn):
-        turned = _turned(points, factor)
-        shifts, wide = _shifts(turned, patches, _BIN * pitch), pitch * abs(factor) / scale
+    for factor in _vote_factors(vectors, patches, scale, pitch, most_turn):
+        turned = _transformed(points, factor)
+        shifts = _vote_shifts(turned, patches, _BIN_WIDTH * pitch)
+        wide = pitch * abs(factor) / scale
         matches = _first_matches(turned, joint, shifts, patches, _NEAR * wide)
         seeds = [
             _Growth(points, reach, turned + shift, patches, wide, match)
             for shift, match in zip(shifts, matches, strict=True)
         ]
-        for seed in _likeliest(seeds, inside, most_seeds):
+        for seed in _best_seeds(seeds, inside, most_seeds):
             grown = seed.placement(factor, inside)
             if grown is not None:
                 found.append(grown)
-            if grown is not None and grown.score > _SURE * len(points):
+            if grown is not None and grown.score > _SUFFICIENT * len(points):
                 break
     return sorted(found, key=lambda one: -one.score)
 
 
-def _likeliest(seeds: list["_Growth"], inside: Inside, most: int) -> list["_Growth"]:
+def _best_seeds(seeds: list["_Growth"], inside: Inside, most: int) -> list["_Growth"]:
     """Returns the seeds of best rank, and that of most matches less what is missing.
 
     A column alone in view matches each of the lattice's; what is missing beside it tells which.
@@ -113,7 +114,7 @@ def _likeliest(seeds: list["_Growth"], inside: Inside, most: int) -> list["_Grow
     ranks = {seed: seed.rank(inside) for seed in seeds}
     ranked = sorted(seeds, key=ranks.__getitem__)
     net = min(ranked, key=lambda one: sum(ranks[one]), default=None)
-    equal = [one for one in ranked[:most] if one.size >= _AS_MANY * ranked[0].size]
+    equal = [one for one in ranked[:most] if one.size >= _EQUIVALENT * ranked[0].size]
     best = max(ranked[:_MOST_SEEDS], equal, key=len)
     return [*([net] if net else []), *(one for one in best if one is not net)]
 
@@ -127,21 +128,21 @@ def match_one_to_one(expected: Floats, found: Floats, gate: float) -> tuple[Ints
     return units, near[units]
 
 
-def _turned(points: Floats, factor: complex) -> Floats:
+def _transformed(points: Floats, factor: complex) -> Floats:
     turned = (points @ np.array([1, 1j])) * factor
     return np.stack([turned.real, turned.imag], axis=-1)
 
 
-def _linear_factors(
+def _vote_factors(
     vectors: np.ndarray, patches: Floats, scale: float, pitch: float, most_turn: float
 ) -> Iterator[complex]:
     """Yields turns with scales, as complex factors, that most pairs of neighbours vote for."""
     pairs = cKDTree(patches).query_pairs(1.4 * pitch, output_type="ndarray")
     seen = (patches[pairs[:, 1]] - patches[pairs[:, 0]]) @ np.array([1, 1j])
     seen = seen[np.abs(seen) > 0.6 * pitch]
-    few = vectors[:: -(-len(vectors) // _JOINTS)]
+    few = vectors[:: -(-len(vectors) // _MOST_JOINTS)]
     ratio = (seen[:, None] / np.concatenate([few, -few])).ravel()
-    ratio = ratio[np.abs(np.log(np.abs(ratio) / scale)) < _STRETCH]
+    ratio = ratio[np.abs(np.log(np.abs(ratio) / scale)) < _LOG_SIZE]
     ratio = ratio[np.abs(np.angle(ratio)) <= most_turn]
     if not len(ratio):
         return
@@ -156,7 +157,7 @@ def _linear_factors(
         yield complex(np.exp(np.log(near * np.exp(-1j * angle)).mean() + 1j * angle))
 
 
-def _shifts(turned: Floats, patches: Floats, width: float) -> Floats:
+def _vote_shifts(turned: Floats, patches: Floats, width: float) -> Floats:
     """Returns the shifts (n, 2) that most pairs of patch and unit vote for, the best first."""
     pairs = (patches[:, None] - turned).reshape(-1, 2)
     low = pairs.min(axis=0)
@@ -228,34 +229,35 @@ class _Growth:
         place = self._grow()
         if place is None:
             return None
-        self._patch[np.linalg.norm(place - self._seen(place), axis=1) > _GATE * self._pitch] = -1
+        off = np.linalg.norm(place - self._observed(place), axis=1)
+        self._patch[off > _GATE * self._pitch] = -1
         unit = np.flatnonzero(self._patch >= 0)
-        if len(unit) < _LEAST:
+        if len(unit) < _LEAST_MATCHES:
             return None
         missing = int((inside(place) & (self._patch < 0)).sum())
         return Placement(
             unit,
             self._patch[unit],
-            self._seen(place),
+            self._observed(place),
             float(np.angle(factor)),
             missing,
-            self._continuing(),
+            self._count_surplus(),
         )
 
     def _grow(self) -> Floats | None:
         """Matches more units in turns; returns where all are expected, None if too few match."""
-        if self.size < _LEAST:
+        if self.size < _LEAST_MATCHES:
             return None
-        place, far = self._expected()
+        place, far = self._extrapolated()
         for reach in self._reach:
             for _ in range(_ROUNDS):
                 if not self._match((self._patch < 0) & (far < reach), place):
                     break
-                place, far = self._expected()
+                place, far = self._extrapolated()
         return place
 
     def _match(self, alone: Mask, place: Floats) -> bool:
-        """Gives units without a patch free ones at their places; tells whether there were any."""
+        """Matches units with free patches at their places; returns whether there were any."""
         free = np.setdiff1d(np.arange(len(self._patches)), self._patch)
         if not (alone.any() and len(free)):
             return False
@@ -263,12 +265,12 @@ class _Growth:
         self._patch[np.flatnonzero(alone)[unit]] = free[patch]
         return bool(len(unit))
 
-    def _continuing(self) -> int:
-        """Counts patches without a unit that go on with the lattice, about a pitch from others."""
+    def _count_surplus(self) -> int:
+        """Counts patches without a unit that continue the lattice, about a pitch from others."""
         taken = np.zeros(len(self._patches), bool)
         taken[self._patch[self._patch >= 0]] = True
         apart = cdist(self._patches, self._patches)
-        beside = (apart < _BESIDE * self._pitch) & (apart > _APART * self._pitch)
+        beside = (apart < _FARTHEST * self._pitch) & (apart > _NEAREST_DISTANCE * self._pitch)
         before = int(taken.sum())
         for _ in range(_ROUNDS):
             more = ~taken & (beside[:, taken].sum(axis=1) > 1)
@@ -277,12 +279,12 @@ class _Growth:
             taken |= more
         return int(taken.sum()) - before
 
-    def _seen(self, place: Floats) -> Floats:
+    def _observed(self, place: Floats) -> Floats:
         """Replaces expected places by those of the units' own patches."""
         return np.where(self._patch[:, None] >= 0, self._patches[self._patch], place)
 
-    def _expected(self) -> tuple[Floats, Floats]:
-        """Returns where other matches expect units (units, 2), and how far the nearest one is."""
+    def _extrapolated(self) -> tuple[Floats, Floats]:
+        """Extrapolates places (units, 2) from other matches; gives distances of the nearest too."""
         known = np.flatnonzero(self._patch >= 0)
         off = self._patches[self._patch[known]] - self._linear[known]
         count = min(_NEAREST + 1, len(known))

@@ -1,4 +1,4 @@
-"""Relocalises units that prediction has lost, by finding the lattice again."""
+"""Relocalises lost units by detecting the lattice again."""
 
 from typing import NamedTuple
 
@@ -14,12 +14,12 @@ from sim.core import Floats, Mask
 
 _MARGIN = 1.0
 """A unit nearer to the rim of the picture is not expected to be a patch of its own, radii."""
-_CLEAR, _FEWEST = 0.1, 3
+_LEAST_MARGIN, _FEWEST = 0.1, 3
 """A placement must be better than those at other places by this part of its matches."""
-_BETTER, _HALF_SEEN, _AGREEING = 1.2, 0.5, 0.2
-_ELSEWHERE = 0.5
+_MATCH_RATIO, _MISSING_SHARE, _SAME_SHARE = 1.2, 0.5, 0.2
+_PLACE_DIFFERENCE = 0.5
 """Distance of places that are others, pitches."""
-_SMOOTH = 25.0
+_DETECTION_PIXELS = 25.0
 """Pixels a pitch that patches need to be seen."""
 
 
@@ -31,19 +31,19 @@ class LatticePlace(NamedTuple):
 
 
 class Relocaliser(NamedTuple):
-    """Looks for a specimen whose units are nowhere near where they were."""
+    """Detects a specimen whose units are far from their last places."""
 
     specimen: SpecimenOutlines  # the units
     camera: Camera  # of its plane
     bright: bool  # whether the units are brighter than what is behind them
 
     def in_view(self, pose: Floats, margin: float = 0.0) -> Mask:
-        """Tells which units (units,) have their middle in the picture, radii from its rim."""
+        """Marks units (units,) whose middle is in the picture, `margin` radii from its rim."""
         place = self.camera.project(self.specimen.centre + pose[:, :2])
         return self._inside(place, margin)
 
-    def placed_again(self, image: Picture, pose: Floats, now: Floats) -> list[LatticePlace]:
-        """Returns where patches show the lattice; places that explain as much go by rising turn.
+    def find_lattice(self, image: Picture, pose: Floats, now: Floats) -> list[LatticePlace]:
+        """Finds where patches show the lattice; equivalent places are sorted by rising turn.
 
         Nothing is returned where fewer patches match than good units claim.
 
@@ -56,7 +56,7 @@ class Relocaliser(NamedTuple):
         scale = float(self.camera.px_per_mm(centre.mean(axis=0)))
         patches = self.camera.unproject(find_blobs(image, self.specimen, scale, self.bright))
         good = np.isfinite(now[:, 0])
-        if len(patches) <= _BETTER * good.sum():
+        if len(patches) <= _MATCH_RATIO * good.sum():
             return []
 
         def inside(place: Floats) -> Mask:
@@ -68,19 +68,20 @@ class Relocaliser(NamedTuple):
             return []
         best = found[0]
         moved = np.linalg.norm(best.place - centre - now[:, :2], axis=1)[good]
-        if len(best.unit) <= _BETTER * good.sum() or best.missing > _HALF_SEEN * len(best.unit):
+        matches = len(best.unit)
+        if matches <= _MATCH_RATIO * good.sum() or best.missing > _MISSING_SHARE * matches:
             return []
-        if (moved < _ELSEWHERE * pitch).sum() > _AGREEING * len(best.unit):
+        if (moved < _PLACE_DIFFERENCE * pitch).sum() > _SAME_SHARE * matches:
             return []  # what is found is where it was taken to be
-        alike = [best, *(other for other in found[1:] if self._rivals(best, other))]
-        alike.sort(key=lambda one: abs(one.turn))
+        candidates = [best, *(other for other in found[1:] if self._is_ambiguous(best, other))]
+        candidates.sort(key=lambda one: abs(one.turn))
         return [
             LatticePlace(np.column_stack([one.place - centre, pose[:, 2] + one.turn]), one.turn)
-            for one in alike
+            for one in candidates
         ]
 
-    def near_unclaimed(self, image: Picture, pose: Floats, good: Mask) -> Mask:
-        """Tells units (units,) near whose places a patch of a unit's size is no good unit's.
+    def near_unassigned(self, image: Picture, pose: Floats, good: Mask) -> Mask:
+        """Marks units (units,) near whose places there is a patch that no good unit is assigned to.
 
         Args:
             image: the frame.
@@ -89,23 +90,25 @@ class Relocaliser(NamedTuple):
         """
         centre, pitch = self.specimen.centre, self.specimen.pitch
         scale = float(self.camera.px_per_mm(centre.mean(axis=0)))
-        factor = max(1, int(scale * pitch / _SMOOTH))
+        factor = max(1, int(scale * pitch / _DETECTION_PIXELS))
         small = cv2.resize(image, None, fx=1 / factor, fy=1 / factor, interpolation=cv2.INTER_AREA)
         found = find_blobs(
             np.asarray(small, np.float32), self.specimen, scale / factor, self.bright
         )
         patches = self.camera.unproject((found + 0.5) * factor - 0.5)
-        place, most = centre + pose[:, :2], _ELSEWHERE * pitch
+        place, most = centre + pose[:, :2], _PLACE_DIFFERENCE * pitch
         if good.any() and len(patches):
             patches = patches[cKDTree(place[good]).query(patches)[0] > most]
         if not len(patches):
             return np.zeros(len(good), bool)
         return np.asarray((cKDTree(patches).query(place)[0] < most) & ~good)
 
-    def _rivals(self, best: Placement, other: Placement) -> bool:
+    def _is_ambiguous(self, best: Placement, other: Placement) -> bool:
         apart = np.median(np.linalg.norm(best.place - other.place, axis=1))
-        clear = max(_CLEAR * len(best.unit), _FEWEST)
-        return bool(apart > _ELSEWHERE * self.specimen.pitch and best.score - other.score < clear)
+        clear = max(_LEAST_MARGIN * len(best.unit), _FEWEST)
+        return bool(
+            apart > _PLACE_DIFFERENCE * self.specimen.pitch and best.score - other.score < clear
+        )
 
     def _inside(self, place: Floats, margin: float) -> Mask:
         scale = float(self.camera.px_per_mm(self.specimen.centre.mean(axis=0)))

@@ -31,7 +31,7 @@ class CoarseLevel:
         image: the frame at rest, of full size.
         specimen: its units.
         camera: what saw it.
-        look: blur at edges, mm, and what the units show: auto, dots, speckle or bare.
+        blur_and_kind: blur at edges, mm, and what the units show: auto, dots, speckle or bare.
         factor: pixels, each way, that are one of the coarse level.
     """
 
@@ -40,14 +40,14 @@ class CoarseLevel:
         image: Picture,
         specimen: SpecimenOutlines,
         camera: Camera,
-        look: tuple[float, str],
+        blur_and_kind: tuple[float, str],
         factor: int,
     ) -> None:
         self._factor = factor
         self._seen = image, self._bin(image)
         coarse = camera.binned(factor)
         pixel = 1 / float(np.median(coarse.px_per_mm(specimen.centre)))
-        fine, kind = look
+        fine, kind = blur_and_kind
         # the mean over f pixels has the variance (f^2 - 1) / 12 of theirs, in squares of a pixel
         blur = float(np.hypot(fine, pixel * np.sqrt((1 - factor**-2) / 12)))
         grid = TemplateGrid(specimen, 1 / pixel, _REACH * blur + 2 * pixel)

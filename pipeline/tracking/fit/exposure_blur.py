@@ -8,14 +8,14 @@ from pipeline.tracking.fit.patch_correlation import Templates
 from pipeline.tracking.fit.template_cells import classify
 from sim.core import Floats, Mask, Reals, Singles
 
-_LEAST = 0.4
-"""A way that is not worth a template of its own, px; so is a change of a third of this."""
-_PER_PIXEL = 2.0
-_MOST = 48
+_SHORTEST = 0.4
+"""Motion in an exposure, px, not worth a template of its own; so is a change by a third of it."""
+_SAMPLES_PER_PIXEL = 2.0
+_MOST_SAMPLES = 48
 
 
 class ExposureBlur:
-    """Averages templates over the ways that units go in an exposure, in place.
+    """Averages templates over the units' motions in an exposure, in place.
 
     Their weights are averaged likewise: the blurred edge reaches farther out, and tells of the
     place wherever the sharp one passes.
@@ -29,47 +29,51 @@ class ExposureBlur:
         pixel: size of a pixel, mm.
 
     Attributes:
-        share: (units, 2) what shows of an acceleration along the way, and about the middle, over
+        share: (units, 2) what shows of an acceleration along the motion, and about the middle, over
             the mean of its shifts.
     """
 
     def __init__(self, templates: Templates, pixel: float) -> None:
         self._templates, self._pixel = templates, pixel
         self._sharp = [
-            (_filled(face, mask), mask)
+            (_extrapolated(face, mask), mask)
             for face, mask in zip(templates.brightness.copy(), templates.weight.copy(), strict=True)
         ]
-        self._way = np.zeros((len(self._sharp), 3))
+        self._travel = np.zeros((len(self._sharp), 3))
         self.share = np.ones((len(self._sharp), 2), np.float16)
 
-    def redraw(self, way: Floats, chosen: Mask | None = None) -> None:
-        """Blurs by ways (units, 3) in mm and rad, in the units' frames, from end to end.
+    def redraw(self, travel: Floats, chosen: Mask | None = None) -> None:
+        """Blurs by motions (units, 3) in mm and rad, in the units' frames, from end to end.
 
         Units that are not ``chosen`` (by default all are) stay as they are.
         """
-        arm = np.column_stack([way[:, :2], way[:, 2] * self._templates.reach])
-        before = np.column_stack([self._way[:, :2], self._way[:, 2] * self._templates.reach])
+        arm = np.column_stack([travel[:, :2], travel[:, 2] * self._templates.reach])
+        before = np.column_stack([self._travel[:, :2], self._travel[:, 2] * self._templates.reach])
         length = np.linalg.norm(arm, axis=1) / self._pixel
-        changed = np.linalg.norm(arm - before, axis=1) / self._pixel > _LEAST / 3
-        changed &= (length > _LEAST) | (np.linalg.norm(before, axis=1) > 0)
+        changed = np.linalg.norm(arm - before, axis=1) / self._pixel > _SHORTEST / 3
+        changed &= (length > _SHORTEST) | (np.linalg.norm(before, axis=1) > 0)
         if chosen is not None:
             changed &= chosen
         for unit in np.flatnonzero(changed).tolist():
-            self._draw(unit, way[unit] if length[unit] > _LEAST else np.zeros(3), length[unit])
+            self._draw(
+                unit, travel[unit] if length[unit] > _SHORTEST else np.zeros(3), length[unit]
+            )
 
-    def _draw(self, unit: int, way: Floats, length: float) -> None:
-        self._way[unit] = way
+    def _draw(self, unit: int, travel: Floats, length: float) -> None:
+        self._travel[unit] = travel
         made = self._templates
         made.brightness[unit], made.weight[unit] = self._sharp[unit]
         self.share[unit] = 1.0
-        if way.any():
-            count = int(np.clip(_PER_PIXEL * length, 3, _MOST))
+        if travel.any():
+            count = int(np.clip(_SAMPLES_PER_PIXEL * length, 3, _MOST_SAMPLES))
             share = (np.arange(count) + 0.5) / count - 0.5
-            faces, masks = (self._moved(each, way, share) for each in self._sharp[unit])
+            faces, masks = (self._warped(each, travel, share) for each in self._sharp[unit])
             made.brightness[unit] = np.mean(faces, axis=0)
             made.weight[unit] = np.mean(masks, axis=0)
             bent = np.average(faces, axis=0, weights=share**2)
-            self.share[unit] = _share(made.brightness[unit], bent, made.weight[unit], way)
+            self.share[unit] = _acceleration_share(
+                made.brightness[unit], bent, made.weight[unit], travel
+            )
         classify(
             made.brightness[unit],
             made.weight[unit],
@@ -79,12 +83,12 @@ class ExposureBlur:
             made.cells.span[unit],
         )
 
-    def _moved(self, values: Singles, way: Floats, share: Floats) -> Singles:
-        """Moves nodes by parts of a way; y goes up with the rows, as in the templates."""
+    def _warped(self, values: Singles, travel: Floats, share: Floats) -> Singles:
+        """Warps a template by parts of a motion; y goes up with the rows, as in the templates."""
         middle, step = values.shape[0] // 2, self._templates.step
         kind = cv2.INTER_CUBIC if values.min() < 0 or values.max() > 1 else cv2.INTER_LINEAR
         out = np.empty((len(share), *values.shape), np.float32)
-        for each, (x, y, turn) in zip(out, share[:, None] * way, strict=True):
+        for each, (x, y, turn) in zip(out, share[:, None] * travel, strict=True):
             cos, sin = np.cos(turn), np.sin(turn)
             matrix = np.array([[cos, -sin, x / step], [sin, cos, y / step]])
             matrix[:, 2] += middle - matrix[:, :2] @ [middle, middle]
@@ -93,8 +97,8 @@ class ExposureBlur:
         return out
 
 
-def _share(face: Reals, bent: Reals, weight: Reals, way: Floats) -> Floats:
-    """Fits what accelerations along a way (3,) and about the middle change of a blurred face.
+def _acceleration_share(face: Reals, bent: Reals, weight: Reals, travel: Floats) -> Floats:
+    """Fits the shares of accelerations along a motion (3,) and about the middle in a blurred face.
 
     Instants t of an exposure T shift the face by a t^2 / 2, in the mean a T^2 / 24; ``bent`` is the
     mean face with weights t^2 over their mean.
@@ -107,7 +111,7 @@ def _share(face: Reals, bent: Reals, weight: Reals, way: Floats) -> Floats:
         right, down = (np.gradient(values, axis=axis)[used] for axis in (1, 0))
         return np.asarray(right, float), np.asarray(down, float)
 
-    ahead = way[:2] / max(float(np.linalg.norm(way[:2])), 1e-12)
+    ahead = travel[:2] / max(float(np.linalg.norm(travel[:2])), 1e-12)
     (right, down), (bent_right, bent_down) = slopes(face), slopes(bent)
     light = (np.ones(len(x)), x, y, face[used])
     across = (ahead[0] * down - ahead[1] * right, *light)
@@ -121,7 +125,7 @@ def _share(face: Reals, bent: Reals, weight: Reals, way: Floats) -> Floats:
     return np.asarray(np.clip(np.diagonal(fit[:2]) / scale, 0.0, 1.0))
 
 
-def _filled(face: Singles, weight: Singles) -> Singles:
+def _extrapolated(face: Singles, weight: Singles) -> Singles:
     """Continues a face (rows, columns) outwards, where it has no weight, by its nearest nodes."""
     near = distance_transform_edt(weight <= 0, return_distances=False, return_indices=True)
     return np.asarray(face[tuple(near)], np.float32)

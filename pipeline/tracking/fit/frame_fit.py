@@ -18,7 +18,7 @@ from sim.core import Floats, Mask, Singles
 
 FULL_STEPS = 8
 _THREADS = min(4, cv2.getNumberOfCPUs())
-_AT_ONCE = 16
+_UNITS_PER_TASK = 16
 """Units that a thread takes at once; the rest is left to whichever thread is free first."""
 
 
@@ -79,19 +79,19 @@ class PoseFitter:
             np.zeros((units, 3)) if drift is None else drift,
         )
         start = FitStart(*(np.ascontiguousarray(each, np.float64) for each in values))
-        wanted = np.isfinite(start.middle[:, 0]) & np.isfinite(scale)
-        wanted = wanted if chosen is None else wanted & chosen
+        selected = np.isfinite(start.middle[:, 0]) & np.isfinite(scale)
+        selected = selected if chosen is None else selected & chosen
         out = np.full((units, patch_correlation.WIDTH), np.nan)
-        if wanted.any():
+        if selected.any():
             scene = FramePixels(self._as_singles(image), image.shape[1], self.blocks)
-            parts = _shares(wanted)
-            left, others = iter(parts), min(_THREADS, len(parts)) - 1
-            beside = [
-                self._threads.submit(self._fit_parts, scene, start, wanted, out, left)
+            parts = _partition(selected)
+            remaining, others = iter(parts), min(_THREADS, len(parts)) - 1
+            pending = [
+                self._threads.submit(self._fit_parts, scene, start, selected, out, remaining)
                 for _ in range(others)
             ]
-            self._fit_parts(scene, start, wanted, out, left)
-            for done in beside:
+            self._fit_parts(scene, start, selected, out, remaining)
+            for done in pending:
                 done.result()
         return patch_correlation.unpack(out)
 
@@ -108,22 +108,27 @@ class PoseFitter:
         return self._singles
 
     def _fit_parts(
-        self, scene: FramePixels, start: FitStart, wanted: Mask, out: Floats, left: Iterator[slice]
+        self,
+        scene: FramePixels,
+        start: FitStart,
+        selected: Mask,
+        out: Floats,
+        remaining: Iterator[slice],
     ) -> None:
         """Fills the rows of parts of the units as long as some are left, which threads share.
 
         Loops over pixels hold no interpreter's lock.
         """
         size = self.templates.weight.shape[1]
-        for part in left:
+        for part in remaining:
             begin = FitStart(*(values[part] for values in start))
-            templates = _part_of(self.templates, part)
+            templates = _subset(self.templates, part)
             patch_correlation.fit_patches(
-                scene, templates, begin, wanted[part], size, FULL_STEPS, out[part]
+                scene, templates, begin, selected[part], size, FULL_STEPS, out[part]
             )
 
 
-def _part_of(templates: Templates, units: slice) -> Templates:
+def _subset(templates: Templates, units: slice) -> Templates:
     """Returns the templates of some of the units; arrays are shared."""
     return templates._replace(
         brightness=templates.brightness[units],
@@ -135,9 +140,9 @@ def _part_of(templates: Templates, units: slice) -> Templates:
     )
 
 
-def _shares(wanted: Mask) -> list[slice]:
+def _partition(selected: Mask) -> list[slice]:
     """Splits units (units,) into ranges with about as many to be fitted in each."""
-    places = np.flatnonzero(wanted)
-    count = max(1, len(places) // _AT_ONCE)
-    ends = [0, *(int(part[0]) for part in np.array_split(places, count)[1:]), len(wanted)]
+    places = np.flatnonzero(selected)
+    count = max(1, len(places) // _UNITS_PER_TASK)
+    ends = [0, *(int(part[0]) for part in np.array_split(places, count)[1:]), len(selected)]
     return [slice(*pair) for pair in itertools.pairwise(ends)]

@@ -75,7 +75,7 @@ class PoseFits(NamedTuple):
         noise: (units,) weighted standard deviation of the residuals.
         share: (units,) part of the information that robust weights and the image's edge left.
         blocks: (units,) number of blocks.
-        last: (units,) length of the last step, px.
+        last_step: (units,) length of the last step, px.
         information: (units,) sum of the squared gradients of the template, weighted.
     """
 
@@ -86,7 +86,7 @@ class PoseFits(NamedTuple):
     noise: Floats
     share: Floats
     blocks: Floats
-    last: Floats
+    last_step: Floats
     information: Floats
 
     def copy(self) -> PoseFits:

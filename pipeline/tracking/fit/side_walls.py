@@ -8,7 +8,7 @@ from pipeline.tracking.fit.template_cells import classify
 from pipeline.tracking.geometry import Depth, SpecimenOutlines
 from sim.core import Floats, Singles
 
-_MOVED = 0.04
+_LEAST_SHIFT = 0.04
 """Movement of a back against its face from which its silhouette is drawn again, px."""
 
 
@@ -41,13 +41,13 @@ class SideWalls:
         self._blur, self._pixel, self._kind, self._templates = blur, pixel, kind, templates
         self._offset = depth.offset(specimen.centre, np.zeros((specimen.count, 3)))
         rest = np.stack([blurred_silhouette(grid, inside, blur) for inside in grid.inside])
-        self._contrast = _contrasts(rest, templates)
+        self._contrast = _fit_contrasts(rest, templates)
         self._board = templates.brightness - self._contrast[:, None, None] * rest
 
     def redraw(self, pose: Floats) -> None:
         """Draws the silhouettes of units (units, 3) whose backs have moved against the faces."""
         offset = self._depth.offset(self._specimen.centre, pose)
-        moved = np.linalg.norm(offset - self._offset, axis=1) > _MOVED * self._pixel
+        moved = np.linalg.norm(offset - self._offset, axis=1) > _LEAST_SHIFT * self._pixel
         moved &= self._templates.reach > 0.0  # others were not seen at rest
         for unit in np.nonzero(moved)[0].tolist():
             outline = self._depth.silhouette(self._specimen.polygon(unit), offset[unit])
@@ -68,7 +68,7 @@ class SideWalls:
             self._offset[unit] = offset[unit]
 
 
-def _contrasts(silhouette: Singles, templates: Templates) -> Floats:
+def _fit_contrasts(silhouette: Singles, templates: Templates) -> Floats:
     """Brightness (units,) of silhouettes over what is around them, least squares by the weights."""
     weight = templates.weight
     total = np.maximum(weight.sum(axis=(1, 2)), 1e-9)

@@ -1,11 +1,11 @@
 from . import import_video as import_video
 from . import load_cell as load_cell
 from . import recording as recording
-from .frame import BrokenOffError as BrokenOffError
 from .frame import Frame as Frame
-from .frame import UntimedError as UntimedError
+from .frame import MissingTimesError as MissingTimesError
+from .frame import TruncatedVideoError as TruncatedVideoError
+from .frame_times import check_durations as check_durations
 from .frame_times import has_uneven_intervals as has_uneven_intervals
-from .frame_times import within_interval as within_interval
 from .picture import is_own_drawing as is_own_drawing
 from .picture import read_picture as read_picture
 from .picture import read_pictures as read_pictures

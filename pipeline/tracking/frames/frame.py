@@ -1,4 +1,4 @@
-"""Holds one picture of a video, and the errors of videos that end early or tell no times."""
+"""Holds one picture of a video, and the errors of truncated videos and missing times."""
 
 import math
 from dataclasses import dataclass
@@ -16,14 +16,14 @@ class Frame:
     image: Picture  # (rows, columns) brightness, from 0 to 255
 
 
-class BrokenOffError(UserError):
-    """Tells of a video that ends too early: the frames before are whole, their track is kept."""
+class TruncatedVideoError(UserError):
+    """Reports a video that ends too early; the frames before are complete, their track is kept."""
 
 
-def broken_off(path: Path, why: str, count: int, time: float) -> BrokenOffError:
-    """Reports a file that holds no more than so many frames, the last one at a time in s."""
+def truncated_video(path: Path, why: str, count: int, time: float) -> TruncatedVideoError:
+    """Makes the error of a file with no more than `count` frames, the last one at a time in s."""
     until = math.floor(1000 * time) / 1000
-    return BrokenOffError(
+    return TruncatedVideoError(
         f"the video breaks off after {count} frames, which are tracked: {why}",
         file=path,
         key="video",
@@ -31,11 +31,11 @@ def broken_off(path: Path, why: str, count: int, time: float) -> BrokenOffError:
     )
 
 
-class UntimedError(UserError):
-    """Tells of a file without times of its frames, for which no rate is given."""
+class MissingTimesError(UserError):
+    """Reports a file without times of its frames, for which no rate is given."""
 
 
-def untimed(path: Path, what: str) -> UntimedError:
-    """Reports such a file."""
+def missing_times(path: Path, what: str) -> MissingTimesError:
+    """Makes the error of such a file."""
     remedy = "add how many were taken in a second, such as frame_rate: '300 Hz'"
-    return UntimedError(what, file=path, key="frame_rate", remedy=remedy)
+    return MissingTimesError(what, file=path, key="frame_rate", remedy=remedy)

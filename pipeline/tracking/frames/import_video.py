@@ -11,14 +11,14 @@ from pipeline.problem.fields import fault
 from pipeline.problem.reading import explain_error, yaml_file
 from pipeline.runtime import UserError
 from pipeline.tracking.frames.picture_folder import has_pictures
-from pipeline.tracking.frames.video import VIDEOS, own_rate, rendered
+from pipeline.tracking.frames.video import VIDEOS, declared_rate, rendered
 from sim.core import Floats, Ints
 
-_WANTED = {"name", "grid", "spacing_mm", "ligament_gap_mm", "bias_angle_deg"}
+_REQUIRED = {"name", "grid", "spacing_mm", "ligament_gap_mm", "bias_angle_deg"}
 _SAME_RATE = 0.03  # relative difference up to which a file's own times are kept
 
 
-class _Described(BaseModel):
+class _VideoDescription(BaseModel):
     """Checks what is taken from a description; ignores the rest."""
 
     model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False)
@@ -51,7 +51,7 @@ def description(path: Path) -> dict[str, Any]:
     """
     document = yaml_file.read_yaml(path)
     data = document.data
-    missing = sorted(_WANTED - data.keys())
+    missing = sorted(_REQUIRED - data.keys())
     if missing:
         raise UserError(
             f"not a description of a test video: it lacks {', '.join(missing)}",
@@ -59,7 +59,7 @@ def description(path: Path) -> dict[str, Any]:
             remedy="give a YAML with the grid of the specimen, or write a recording by hand",
         )
     try:
-        _Described.model_validate(data)
+        _VideoDescription.model_validate(data)
     except ValidationError as error:
         raise explain_error(error, document, data, None) from error
     return data
@@ -92,7 +92,7 @@ def recording_text(described: dict[str, Any], video: Path, design: str) -> str:
     if scale := described.get("approx_px_per_mm"):
         lines.append(f"pixel_size: {1 / scale:.4g} mm")
     if rate := described.get("fps"):
-        own = own_rate(video)
+        own = declared_rate(video)
         if own is None:
             lines.append(f"frame_rate: {rate:g} Hz")
         elif abs(rate / own - 1) > _SAME_RATE:
@@ -131,7 +131,7 @@ def design(described: dict[str, Any]) -> xr.Dataset:
         "centroid": (("unit", "xy"), centre),
         "smallest_gap": ((), _smallest_gap(vertices, joint)),
         "overlaps": ((), 0),
-        **_no_history(),
+        **_empty_history(),
     }
     coordinates = {
         "unit": (("unit",), np.arange(units)),
@@ -147,7 +147,7 @@ def design(described: dict[str, Any]) -> xr.Dataset:
     return xr.Dataset(variables, coordinates).assign_attrs(shipped_method="none")
 
 
-def _no_history() -> dict[str, tuple[tuple[str, ...], Any]]:
+def _empty_history() -> dict[str, tuple[tuple[str, ...], Any]]:
     nothing = np.full((1, 1), np.nan)
     return {
         "constraint_margin": (("constraint",), [np.nan]),

@@ -14,12 +14,12 @@ from sim.core import Image
 WHITE = 255.0
 """Brightness of white."""
 
-_FULL = (1023.0, 4095.0, 16383.0, 65535.0)
+_FULL_SCALES = (1023.0, 4095.0, 16383.0, 65535.0)
 """Greatest levels of cameras of 10 to 16 bit, whose pictures hold them in 16 bit as they are."""
-_SPILT = 2.0
+_OVERSHOOT = 2.0
 """Greatest level where white is one: what sharpens or resamples pictures goes a little beyond."""
 
-_AS_THEY_ARE = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH
+_READ_FLAGS = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH
 
 _KEYWORD, _DRAWN = "Software", "metacloak: python -m pipeline track"
 """Of a chunk of text, by which drawings are known."""
@@ -30,7 +30,7 @@ is_own_drawing = begins_with(f"{_KEYWORD}\0{_DRAWN}")
 def read_levels(path: Path) -> np.ndarray | None:
     """Reads the grey levels (rows, columns) that a picture's file holds; None if it cannot."""
     try:
-        levels = cv2.imread(str(path), _AS_THEY_ARE)
+        levels = cv2.imread(str(path), _READ_FLAGS)
     except cv2.error:  # too many pixels, among others
         return None
     return None if levels is None else np.asarray(levels)
@@ -38,9 +38,9 @@ def read_levels(path: Path) -> np.ndarray | None:
 
 def page_count(path: Path) -> int:
     """Counts the pictures in a TIFF that can be read; previews of another size are none."""
-    if (count := cv2.imcount(str(path), _AS_THEY_ARE)) < 2:
+    if (count := cv2.imcount(str(path), _READ_FLAGS)) < 2:
         return 1
-    pages = cv2.imreadmulti(str(path), 0, 2, flags=_AS_THEY_ARE)[1]
+    pages = cv2.imreadmulti(str(path), 0, 2, flags=_READ_FLAGS)[1]
     return count if len({page.shape for page in pages}) == 1 else 1
 
 
@@ -56,8 +56,10 @@ def full_scale(pictures: Sequence[np.ndarray]) -> float:
         return WHITE
     most = max(float(levels[np.isfinite(levels)].max(initial=0)) for levels in pictures)
     if all(kind.kind == "u" for kind in kinds):
-        return next(top for top in _FULL if top >= most)
-    return 1.0 if most < _SPILT else next((top for top in (WHITE, *_FULL) if top >= most), most)
+        return next(top for top in _FULL_SCALES if top >= most)
+    if most < _OVERSHOOT:
+        return 1.0
+    return next((top for top in (WHITE, *_FULL_SCALES) if top >= most), most)
 
 
 def brightness(levels: np.ndarray, top: float) -> Picture:

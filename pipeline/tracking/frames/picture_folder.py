@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.runtime import Picture, UserError
-from pipeline.tracking.frames.frame import Frame, broken_off, untimed
+from pipeline.tracking.frames.frame import Frame, missing_times, truncated_video
 from pipeline.tracking.frames.picture import brightness, full_scale, page_count, read_levels
 
 _PAGED = {".tif", ".tiff"}
@@ -24,33 +24,35 @@ def read_folder(path: Path, start: float, end: float, rate: float | None) -> Ite
 
     Raises:
         UserError: there are none, the first cannot be read, or no rate is given.
-        BrokenOffError: a later one cannot be read.
+        TruncatedVideoError: a later one cannot be read.
     """
     if rate is None:
-        raise untimed(path, "pictures have no times")
-    inside = takewhile(lambda frame: frame.time <= end, _pictured(path, pictures(path), rate))
+        raise missing_times(path, "pictures have no times")
+    inside = takewhile(lambda frame: frame.time <= end, _frames_of(path, pictures(path), rate))
     yield from (frame for frame in inside if start <= frame.time)
 
 
-def _pictured(path: Path, found: list[Path], rate: float) -> Iterator[Frame]:
-    count, times = 0, [place / rate for place in places(found)]
+def _frames_of(path: Path, found: list[Path], rate: float) -> Iterator[Frame]:
+    count, times = 0, [place / rate for place in frame_indices(found)]
     try:
         for count, image in enumerate(images(found), start=1):
             yield Frame(count - 1, times[count - 1], image)
     except UserError as error:
         if count == 0:
             raise
-        raise broken_off(path, f"{error.file} cannot be read", count, times[count - 1]) from error
+        raise truncated_video(
+            path, f"{error.file} cannot be read", count, times[count - 1]
+        ) from error
 
 
-def places(found: list[Path]) -> list[int]:
+def frame_indices(found: list[Path]) -> list[int]:
     """Numbers a folder's pictures, from zero, by the counter in their names.
 
     Its smallest step is that of a frame; where names differ in more than a counter, or steps are
     no multiples of one, none is taken to be missing.
     """
     plain = list(range(len(found)))
-    if len({_wording(path) for path in found}) > 1:
+    if len({_name_pattern(path) for path in found}) > 1:
         return plain
     numbers = np.array([_numbers(path)[0] for path in found])
     counters = np.flatnonzero((numbers != numbers[0]).any(axis=0))
@@ -69,7 +71,7 @@ def pictures(folder: Path) -> list[Path]:
     Raises:
         UserError: there are none.
     """
-    found = _listed(folder)
+    found = _list_pictures(folder)
     if not found:
         remedy = "give a video file, or a folder of numbered .png or .tif files"
         raise UserError("the folder holds no pictures", file=folder, remedy=remedy)
@@ -77,11 +79,11 @@ def pictures(folder: Path) -> list[Path]:
 
 
 def has_pictures(folder: Path) -> bool:
-    """Tells whether a folder holds pictures."""
-    return bool(_listed(folder))
+    """Tests whether a folder holds pictures."""
+    return bool(_list_pictures(folder))
 
 
-def _listed(folder: Path) -> list[Path]:
+def _list_pictures(folder: Path) -> list[Path]:
     inside = folder.iterdir() if folder.is_dir() else ()
     return [
         path
@@ -94,7 +96,7 @@ def _numbers(path: Path) -> tuple[list[int], str]:
     return [int(digits) for digits in re.findall(r"\d+", path.stem)], path.name
 
 
-def _wording(path: Path) -> str:
+def _name_pattern(path: Path) -> str:
     """Returns a picture's name without its numbers."""
     return re.sub(r"\d+", "0", path.stem)
 

@@ -34,7 +34,7 @@ class Window(Section):
     end: Duration | None = None
 
     @model_validator(mode="after")
-    def _forwards(self) -> Self:
+    def _check_order(self) -> Self:
         if self.end is not None and self.end <= self.start:
             what = f"it ends at {self.end:g} s, where it starts at {self.start:g} s"
             raise fault(what, "let it end after it starts")
@@ -127,7 +127,7 @@ class Recording(Section):
         return self
 
     @model_validator(mode="after")
-    def _as_rendered(self) -> Self:
+    def _check_virtual(self) -> Self:
         """Refuses what differs from the section `virtual`, which alone tells it there."""
         if self.virtual is None:
             return self

@@ -11,17 +11,17 @@ import av
 
 from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.runtime import UserError
-from pipeline.tracking.frames.decoded_picture import Orientation, Shades, orientation
-from pipeline.tracking.frames.frame import Frame, broken_off
+from pipeline.tracking.frames.decoded_picture import BrightnessConverter, Orientation, orientation
+from pipeline.tracking.frames.frame import Frame, truncated_video
 from pipeline.tracking.frames.frame_times import (
-    BARE,
+    ELEMENTARY_STREAMS,
     FrameClock,
-    goes_on,
+    is_truncated,
     stream_length,
 )
-from pipeline.tracking.frames.picture_folder import pictures, places, read_folder
+from pipeline.tracking.frames.picture_folder import frame_indices, pictures, read_folder
 
-_KINDS = {
+_FORMATS = {
     ".mp4": "mov",
     ".mkv": "matroska",
     ".avi": "avi",
@@ -53,15 +53,15 @@ _KINDS = {
 }
 """FFmpeg's names of the files that hold what they show: playlists name others, and may wait."""
 
-VIDEOS = tuple(_KINDS)
+VIDEOS = tuple(_FORMATS)
 """Ends of their names."""
 
-_ALONE = {"protocol_whitelist": "file", "format_whitelist": ",".join(_KINDS.values())}
+_OPTIONS = {"protocol_whitelist": "file", "format_whitelist": ",".join(_FORMATS.values())}
 
-_LARGEST = 1 << 27
+_MOST_PIXELS = 1 << 27
 """Pixels of a frame."""
 
-_AHEAD = 2
+_PREFETCHED = 2
 """Frames that are decoded while one is looked at."""
 
 
@@ -80,12 +80,12 @@ def read_frames(
     Raises:
         UserError: no such file, or none that can be read; one without times or a rate; one that
             is interlaced.
-        BrokenOffError: after the frames that there are, if it breaks off or changes its size.
+        TruncatedVideoError: after the frames that there are, if it breaks off or changes its size.
     """
     if path.is_dir():
-        yield from _even(path, read_folder(path, start, end, rate))
+        yield from _check_size(path, read_folder(path, start, end, rate))
     else:
-        yield from _ahead(_even(path, _filmed(path, start, end, rate)))
+        yield from _prefetch(_check_size(path, _decode(path, start, end, rate)))
 
 
 def frame_count(path: Path) -> int:
@@ -102,14 +102,14 @@ def frame_count(path: Path) -> int:
         return 1
 
 
-def own_rate(path: Path) -> float | None:
+def declared_rate(path: Path) -> float | None:
     """Reads the frames per second that a video tells; None where it tells none."""
     if path.is_dir():
         return None
     try:
         with open_video(path) as container:
             rate = container.streams.video[0].average_rate
-            return None if container.format.name in BARE or not rate else float(rate)
+            return None if container.format.name in ELEMENTARY_STREAMS or not rate else float(rate)
     except (av.FFmpegError, FileNotFoundError, IndexError):
         return None
 
@@ -117,7 +117,7 @@ def own_rate(path: Path) -> float | None:
 def video_length(path: Path, rate: float | None = None) -> float:
     """Reads how long a video is, s, at a rate if one is given; infinite where nothing tells."""
     if path.is_dir():
-        return (places(pictures(path))[-1] + 1) / rate if rate else math.inf
+        return (frame_indices(pictures(path))[-1] + 1) / rate if rate else math.inf
     try:
         with open_video(path) as container:
             return stream_length(container, container.streams.video[0], rate)
@@ -125,31 +125,31 @@ def video_length(path: Path, rate: float | None = None) -> float:
         return math.inf
 
 
-def _ahead(frames: Iterator[Frame]) -> Iterator[Frame]:
+def _prefetch(frames: Iterator[Frame]) -> Iterator[Frame]:
     """Yields frames that a thread decodes meanwhile; its errors come after the frames before."""
     with ThreadPoolExecutor(1) as thread:
-        coming = deque(thread.submit(next, frames, None) for _ in range(_AHEAD))
+        coming = deque(thread.submit(next, frames, None) for _ in range(_PREFETCHED))
         while (frame := coming.popleft().result()) is not None:
             coming.append(thread.submit(next, frames, None))
             yield frame
 
 
-def _even(path: Path, shown: Iterator[Frame]) -> Iterator[Frame]:
+def _check_size(path: Path, shown: Iterator[Frame]) -> Iterator[Frame]:
     """Yields the frames as long as they are of one size."""
     size, time = None, 0.0
     for frame in shown:
         size = frame.image.shape if size is None else size
         if frame.image.shape != size:
-            raise broken_off(path, "it changes its size", frame.index, time)
+            raise truncated_video(path, "it changes its size", frame.index, time)
         time = frame.time
         yield frame
 
 
-def _filmed(path: Path, start: float, end: float, rate: float | None) -> Iterator[Frame]:
+def _decode(path: Path, start: float, end: float, rate: float | None) -> Iterator[Frame]:
     try:
         with open_video(path) as container:
             stream = _video_stream(container, path)
-            yield from _decoded(container, stream, path, (start, end), rate)
+            yield from _frames_in_window(container, stream, path, (start, end), rate)
     except FileNotFoundError as error:
         raise UserError("no such video", file=path, key="video", remedy="check the path") from error
     except av.FFmpegError as error:
@@ -171,7 +171,7 @@ def open_video(path: Path) -> av.container.InputContainer:
     if path.exists() and not path.is_file():
         raise UserError("not a plain file", file=path, key="video", remedy="give a video file")
     try:
-        return av.open(f"file:{path}", options=_ALONE)
+        return av.open(f"file:{path}", options=_OPTIONS)
     except av.ArgumentError as error:
         ends = shlex.quote(path.name), shlex.quote(f"{path.stem}_ffv1.mkv")
         made = "ffmpeg -i {} -c:v ffv1 {}".format(*ends)
@@ -185,14 +185,14 @@ def _video_stream(container: av.container.InputContainer, path: Path) -> av.Vide
     if not container.streams.video or container.streams.video[0].codec_context is None:
         raise UserError("the file holds no video", file=path, remedy="give a video file")
     stream = container.streams.video[0]
-    if stream.width * stream.height > _LARGEST:
+    if stream.width * stream.height > _MOST_PIXELS:
         size = f"{stream.width} x {stream.height}"
         remedy = "give a smaller one, or one that is not broken"
         raise UserError(f"frames of {size} pixels are too large", file=path, remedy=remedy)
     return stream
 
 
-def _decoded(
+def _frames_in_window(
     container: av.container.InputContainer,
     stream: av.VideoStream,
     path: Path,
@@ -202,7 +202,7 @@ def _decoded(
     index, time, (start, end) = 0, 0.0, window
     decoded, shades, clock = (
         iter(container.decode(stream)),
-        Shades(),
+        BrightnessConverter(),
         FrameClock(path, stream, rate),
     )
     while time < end:
@@ -211,10 +211,10 @@ def _decoded(
         except av.FFmpegError as error:
             if index == 0:
                 raise
-            raise broken_off(path, str(error.strerror), index, time) from error
+            raise truncated_video(path, str(error.strerror), index, time) from error
         if frame is None:
-            if goes_on(container, stream, index, clock.lasted):
-                raise broken_off(path, "the file should go on", index, time)
+            if is_truncated(container, stream, index, clock.elapsed):
+                raise truncated_video(path, "the file should go on", index, time)
             return
         time = clock(index, frame)
         if time > end:

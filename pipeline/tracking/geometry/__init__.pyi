@@ -1,9 +1,9 @@
 from .camera import Camera as Camera
 from .camera import camera_of as camera_of
-from .camera_fit import cameras_alike as cameras_alike
 from .camera_fit import fit_camera as fit_camera
 from .camera_fit import lens_variance as lens_variance
 from .camera_fit import pixel_noise as pixel_noise
+from .camera_fit import sigma_point_cameras as sigma_point_cameras
 from .depth import Depth as Depth
 from .depth import estimate_depth as estimate_depth
 from .homography import fit_homography as fit_homography

@@ -16,7 +16,7 @@ import xarray as xr
 from pipeline.tracking.geometry.homography import fit_homography
 from sim.core import Floats
 
-_INVERSE_STEPS = 8
+_NEWTON_STEPS = 8
 _TINY, _SMALL = 1e-9, 1e-6
 _STEEPEST = 1.55
 """Angle to the axis of a fisheye beyond which nothing of a plane is seen, rad."""
@@ -53,8 +53,8 @@ class Camera:
 
     def project(self, points: Floats) -> Floats:
         """Maps points (..., 2) of the plane in mm to pixels (..., 2)."""
-        offset = self._flat(points)[0] - self.centre
-        return np.asarray(self.centre + offset * self._gain(*self._radius(offset)))
+        offset = self._project_pinhole(points)[0] - self.centre
+        return np.asarray(self.centre + offset * self._distortion_gain(*self._radius(offset)))
 
     def unproject(self, pixels: Floats) -> Floats:
         """Maps pixels (..., 2) to points (..., 2) of the plane in mm."""
@@ -64,8 +64,8 @@ class Camera:
         points = flat @ inverse[:2, :2].T + inverse[:2, 2]
         return points / (flat @ inverse[2, :2] + inverse[2, 2])[..., None]
 
-    def facing(self, points: Floats, pixels: Floats) -> Camera:
-        """Returns one of the same lens that sees points (n, 2) at pixels: another homography."""
+    def resected(self, points: Floats, pixels: Floats) -> Camera:
+        """Returns a resection by the same lens, whose homography maps points (n, 2) to pixels."""
         ratio = self._undistorting(pixels)[..., None]
         flat = self.centre + (pixels - self.centre) * ratio
         return replace(self, homography=fit_homography(points, flat))
@@ -93,7 +93,7 @@ class Camera:
         x, y = np.moveaxis((pixels - self.centre) / self.scale, -1, 0)
         seen = np.maximum(np.sqrt(x**2 + y**2), 1e-12)
         radius = seen
-        for _ in range(_INVERSE_STEPS):
+        for _ in range(_NEWTON_STEPS):
             square = radius**2
             excess = radius * (1 + square * (first + square * second)) - seen
             radius = radius - excess / (1 + square * (3 * first + square * 5 * second))
@@ -104,11 +104,11 @@ class Camera:
 
     def jacobian(self, points: Floats) -> Floats:
         """Differentiates (..., 2, 2) the pixels after the points, px/mm."""
-        flat, depth = self._flat(points)
+        flat, depth = self._project_pinhole(points)
         h = self.homography
         slope = (h[:2, :2] - flat[..., None] * h[2, :2]) / depth[..., None]
         offset = flat - self.centre
-        return np.asarray(self._bent(offset, *self._radius(offset)) @ slope)
+        return np.asarray(self._distortion_jacobian(offset, *self._radius(offset)) @ slope)
 
     def parameter_slopes(self, points: Floats) -> Floats:
         """Differentiates (..., 2, 13) the pixels after the parameters.
@@ -116,17 +116,17 @@ class Camera:
         These are the homography row by row but its last entry, the centre, the radial coefficients
         and the fisheye's.
         """
-        flat, depth = self._flat(points)
+        flat, depth = self._project_pinhole(points)
         offset = flat - self.centre
         radius = self._radius(offset)
-        bent = self._bent(offset, *radius)
+        bent = self._distortion_jacobian(offset, *radius)
         seen = np.append(points, np.ones((*points.shape[:-1], 1)), axis=-1) / depth
         rows = (bent[..., k, None] * seen[..., None, :] for k in range(2))
         last = -(bent @ flat[..., None]) * seen[..., None, :2]
         lens = offset[..., None] * self._lens_slopes(*radius)[..., None, :]
         return np.concatenate([*rows, last, np.eye(2) - bent, lens], axis=-1)
 
-    def _flat(self, points: Floats) -> tuple[Floats, Floats]:
+    def _project_pinhole(self, points: Floats) -> tuple[Floats, Floats]:
         """Maps points (..., 2) to pixels without distortion, and divides by (..., 1)."""
         h = self.homography
         depth = (points @ h[2, :2] + h[2, 2])[..., None]
@@ -144,12 +144,12 @@ class Camera:
         m = np.maximum(self.fisheye * np.sqrt(square), _TINY)
         return square, np.arctan(m) / m
 
-    def _gain(self, square: Floats, ratio: Floats) -> Floats:
+    def _distortion_gain(self, square: Floats, ratio: Floats) -> Floats:
         """Computes r (1 + k1 t + k2 t^2), t = s r^2, by which distortion lengthens an offset."""
         t = square * ratio**2
         return np.asarray(ratio * (1 + t * (self.radial[0] + t * self.radial[1])))
 
-    def _chain(self, square: Floats, ratio: Floats) -> tuple[Floats, Floats]:
+    def _gain_slopes(self, square: Floats, ratio: Floats) -> tuple[Floats, Floats]:
         """Differentiates the gain after r, and r after s: twice the latter over f^2."""
         t = square * ratio**2
         m2 = self.fisheye**2 * square
@@ -157,18 +157,20 @@ class Camera:
         curl = np.where(m2 < _SMALL, close, (1 / (1 + m2) - ratio) / np.maximum(m2, _SMALL))
         return 1 + t * (3 * self.radial[0] + 5 * t * self.radial[1]), curl
 
-    def _bent(self, offset: Floats, square: Floats, ratio: Floats) -> Floats:
+    def _distortion_jacobian(self, offset: Floats, square: Floats, ratio: Floats) -> Floats:
         """Differentiates (..., 2, 2) the pixels after those without distortion."""
-        after_ratio, curl = self._chain(square, ratio)
+        after_ratio, curl = self._gain_slopes(square, ratio)
         steeper = self.radial[0] + 2 * square * ratio**2 * self.radial[1]
         slope = after_ratio * self.fisheye**2 * curl / 2 + ratio**3 * steeper
         outer = offset[..., :, None] * offset[..., None, :] * (2 / self.scale**2)
-        return self._gain(square, ratio)[..., None] * np.eye(2) + slope[..., None] * outer
+        return (
+            self._distortion_gain(square, ratio)[..., None] * np.eye(2) + slope[..., None] * outer
+        )
 
     def _lens_slopes(self, square: Floats, ratio: Floats) -> Floats:
         """Differentiates (..., 3) the gain after both radial coefficients and the fisheye's."""
         t = square * ratio**2
-        after_ratio, curl = self._chain(square, ratio)
+        after_ratio, curl = self._gain_slopes(square, ratio)
         fisheye = after_ratio * self.fisheye * square * curl
         return np.concatenate([ratio * t, ratio * t**2, fisheye], axis=-1)
 

@@ -1,4 +1,4 @@
-"""Fits the camera that sees known points of a plane, and tells which others may have seen them."""
+"""Fits the camera that sees known points of a plane, and sigma points of its covariance."""
 
 from collections.abc import Iterator
 
@@ -17,7 +17,7 @@ _USUAL_DISTORTION = 0.02
 per cent at most, and few by a third."""
 _FISHEYE = (0.7, 0.5)
 """A usual one, from which to start, and the standard deviation of the prior."""
-_BETTER = 0.6
+_RESIDUAL_RATIO = 0.6
 """A fisheye's squared residuals must be so much smaller than those of the usual lens."""
 _MAD, _TINY = 1.4826, 1e-9
 _NODES, _STEP = 48, 0.5
@@ -42,46 +42,46 @@ def fit_camera(
         start: a camera near the solution; by default the best homography.
     """
     if start is not None:
-        return _Lens(points, pixels, sigma, start).fitted()
+        return _CameraFit(points, pixels, sigma, start).fit()
     homography, middle = fit_homography(points, pixels), (np.array(size) - 1) / 2
     usual, fisheye = (
-        _Lens(points, pixels, sigma, Camera(homography, middle, np.zeros(2), size, kind)).fitted()
+        _CameraFit(points, pixels, sigma, Camera(homography, middle, np.zeros(2), size, kind)).fit()
         for kind in (0.0, _FISHEYE[0])
     )
     left, left_fisheye = (
         float(np.median(np.square(one.project(points) - pixels).sum(axis=1)))
         for one in (usual, fisheye)
     )
-    return fisheye if left_fisheye < _BETTER * left else usual
+    return fisheye if left_fisheye < _RESIDUAL_RATIO * left else usual
 
 
 def pixel_noise(points: Floats, pixels: Floats, camera: Camera) -> float:
     """Estimates the standard deviation of pixels (n, 2) about where a fitted camera sees points."""
     off = camera.project(points) - pixels
-    free = max(off.size - _Lens.count, 1) / off.size
+    free = max(off.size - _CameraFit.count, 1) / off.size
     return _MAD * float(np.median(np.abs(off))) / np.sqrt(free)
 
 
-def cameras_alike(points: Floats, pixels: Floats, camera: Camera) -> list[Camera]:
-    """Returns cameras a standard deviation from a fitted one, along the axes of its covariance.
+def sigma_point_cameras(points: Floats, pixels: Floats, camera: Camera) -> list[Camera]:
+    """Returns the sigma points of a fitted camera: a deviation along each axis of its covariance.
 
     What each of them makes of a picture, less what the fitted one does, is an independent error.
     """
-    lens = _Lens(points, pixels, max(pixel_noise(points, pixels, camera), 1e-9), camera)
-    return lens.alike()
+    lens = _CameraFit(points, pixels, max(pixel_noise(points, pixels, camera), 1e-9), camera)
+    return lens.sigma_points()
 
 
 def lens_variance(
-    camera: Camera, alike: list[Camera], centre: Floats, motion: Reals
+    camera: Camera, sigma_points: list[Camera], centre: Floats, motion: Reals
 ) -> Iterator[tuple[slice, Floats]]:
-    """Yields blocks of frames, and variances (frames, units, 3) of motions by the camera's doubt.
+    """Yields blocks of frames, and variances (frames, units, 3) by the camera's uncertainty.
 
     Away from where it was fitted its distortion is extrapolated, and a unit that travels through
     the picture seems to move by the change of that error. Variances are in mm^2 and rad^2.
 
     Args:
         camera: by which the motions were found.
-        alike: others that are a standard deviation off, each by an error of its own.
+        sigma_points: others that are a standard deviation off, each by an error of its own.
         centre: (units, 2) places at rest, mm.
         motion: (frames, units, 3) from there, NaN where missing.
     """
@@ -96,7 +96,7 @@ def lens_variance(
     there = (centre - low).T / cells[:, None]
     fields = [
         [(field, map_coordinates(field, there, order=1)) for field in errors]
-        for errors in _errors(camera, alike, nodes)
+        for errors in _projection_errors(camera, sigma_points, nodes)
     ]
     for block in blocks:
         known = np.isfinite(motion[block, :, 0])
@@ -111,7 +111,7 @@ def lens_variance(
         yield block, out
 
 
-class _Lens:
+class _CameraFit:
     """Scales the parameters of a camera, and computes residuals of what it sees and of its prior.
 
     The camera is of the kind of the start.
@@ -128,19 +128,19 @@ class _Lens:
         matrix, fisheye = start.homography.ravel()[:8], np.array([start.fisheye])
         self._first = np.concatenate([matrix, start.centre, start.radial, fisheye]) / self._unit
 
-    def fitted(self) -> Camera:
+    def fit(self) -> Camera:
         """Fits it by robust least squares."""
-        near = self._found(self._first)
-        return self._camera(self._found(near, loss="soft_l1", f_scale=3.0))
+        near = self._minimise(self._first)
+        return self._camera(self._minimise(near, loss="soft_l1", f_scale=3.0))
 
-    def alike(self) -> list[Camera]:
+    def sigma_points(self) -> list[Camera]:
         """Returns the start moved along each axis of its covariance, the inverse of J^T J."""
-        _, size, axes = np.linalg.svd(self._slopes(self._first), full_matrices=False)
+        _, size, axes = np.linalg.svd(self._jacobian(self._first), full_matrices=False)
         return [self._camera(self._first + axis / s) for s, axis in zip(size, axes, strict=True)]
 
-    def _found(self, start: Floats, **loss: str | float) -> Floats:
+    def _minimise(self, start: Floats, **loss: str | float) -> Floats:
         found = least_squares(
-            self._residuals, start, self._slopes, x_scale="jac", xtol=1e-12, **loss
+            self._residuals, start, self._jacobian, x_scale="jac", xtol=1e-12, **loss
         )
         return np.asarray(found.x)
 
@@ -158,7 +158,7 @@ class _Lens:
         bent = np.sign(bent) * np.sqrt(np.log1p(bent**2))
         return np.concatenate([off, aside, bent, [(vector[12] - start.fisheye) / _FISHEYE[1]]])
 
-    def _slopes(self, vector: Floats) -> Floats:
+    def _jacobian(self, vector: Floats) -> Floats:
         """Differentiates the residuals after the scaled parameters."""
         made, start = self._camera(vector), self._start
         prior = np.zeros((5, len(vector)))
@@ -172,8 +172,8 @@ class _Lens:
         return np.concatenate([seen.reshape(-1, len(vector)), prior]) * self._unit
 
 
-def _errors(camera: Camera, others: list[Camera], places: Floats) -> Iterator[Floats]:
-    """Yields by how much (3, ...) shift and rotation at places (..., 2) differ for each other."""
+def _projection_errors(camera: Camera, others: list[Camera], places: Floats) -> Iterator[Floats]:
+    """Yields the errors (3, ...) of shift and rotation at places (..., 2) by each other camera."""
     x, y = np.array([_STEP, 0.0]), np.array([0.0, _STEP])
     around = [places, places + x, places - x, places + y, places - y]
     seen = [(camera.project(at), camera.jacobian(at)) for at in around]  # for all the others

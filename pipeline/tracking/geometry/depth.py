@@ -13,7 +13,7 @@ import shapely
 from pipeline.tracking.geometry.camera import Camera
 from sim.core import Floats
 
-_ROUNDS = 4
+_ITERATIONS = 4
 
 
 class Depth(NamedTuple):
@@ -63,15 +63,15 @@ def estimate_depth(camera: Camera, middle: Floats, thickness: float, distance: f
     """
     scale = float(camera.px_per_mm(middle[None])[0])
     axis, focal = (np.array(camera.size) - 1) / 2, scale * distance
-    eye = np.array([*middle, distance])
-    for _ in range(_ROUNDS):
-        eye = _eye(camera.homography, axis, focal)
-        focal *= distance / float(np.linalg.norm(eye - [*middle, 0.0]))
-    return Depth(thickness, eye[:2], abs(float(eye[2])))
+    camera_centre = np.array([*middle, distance])
+    for _ in range(_ITERATIONS):
+        camera_centre = _projection_centre(camera.homography, axis, focal)
+        focal *= distance / float(np.linalg.norm(camera_centre - [*middle, 0.0]))
+    return Depth(thickness, camera_centre[:2], abs(float(camera_centre[2])))
 
 
-def _eye(homography: Floats, axis: Floats, focal: float) -> Floats:
-    """Returns the centre of projection (3,) of a camera with this focal length, px."""
+def _projection_centre(homography: Floats, axis: Floats, focal: float) -> Floats:
+    """Computes the projection centre (3,) of a camera with this focal length, px."""
     inner = np.array([[focal, 0.0, axis[0]], [0.0, focal, axis[1]], [0.0, 0.0, 1.0]])
     columns = np.linalg.inv(inner) @ homography
     columns *= 2 / (np.linalg.norm(columns[:, 0]) + np.linalg.norm(columns[:, 1]))

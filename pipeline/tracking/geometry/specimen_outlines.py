@@ -59,7 +59,7 @@ class SpecimenOutlines:
 
 
 def as_built(design: xr.Dataset, structure: str) -> xr.Dataset:
-    """Gives a design the vertices of one of its structures: intact, altered or cloaked."""
+    """Replaces a design's vertices by those of a structure: intact, altered or cloaked."""
     if structure == "cloaked":
         return design
     vertices = design["vertices_initial"]
@@ -70,7 +70,7 @@ def as_built(design: xr.Dataset, structure: str) -> xr.Dataset:
 
 
 def difference_of_vertices(tracked: Floats, built: Floats) -> str | None:
-    """Tells how the vertices (units, vertices, 2) of a track differ from others, NaN where absent.
+    """Describes how vertices (units, vertices, 2) of a track differ from others, NaN where absent.
 
     None where all lie within half a millimetre.
     """

@@ -1,4 +1,4 @@
-"""Takes out of motions what the camera adds: drifts, knocks, rows that are read later."""
+"""Removes the camera's motion: drifts, knocks; computes when rows are read."""
 
 import logging
 
@@ -13,14 +13,14 @@ LOG = logging.getLogger(__name__)
 
 _LEAST = 2
 """Clamped units that tell of the camera."""
-_MOVED = 0.2
+_LEAST_MOTION = 0.2
 """Motion of all clamped units that is told of, px."""
 
 
 def remove_camera_motion(
     motion: Reals, sigma: Reals, specimen: SpecimenOutlines, pixel: float, setup: RecordingSetup
 ) -> None:
-    """Takes out, in place, what all clamped units do together, or tells of it.
+    """Removes, in place, the rigid motion of all clamped units, or warns of it.
 
     Poses of frames that show fewer than two of them are lost (NaN), as the camera's is.
 
@@ -43,7 +43,7 @@ def remove_camera_motion(
         return
     moved = common[:, None, :2] + arm_swing(common[:, None, 2], specimen.centre[held])
     ends = np.nanmax(np.linalg.norm(moved, axis=2)) / pixel
-    if ends > _MOVED:
+    if ends > _LEAST_MOTION:
         LOG.warning(
             "all clamped units move together, by up to %.2f px: the camera moved, or what"
             " holds them; `camera: follows supports` takes it out",

@@ -11,29 +11,29 @@ STEADY, DUPLICATE, DROPPED = range(3)
 _TICK, _FEWEST = 0.6e-3, 4
 """Seconds by which a stamp is off where milliseconds are counted, about half of one; frames that
 show it."""
-_LONGEST = 4
+_LONGEST_RUN = 4
 """Frames in a row that may repeat one; more show that nothing moves."""
-_GAP, _SELDOM = 1.7, 0.1
+_GAP_RATIO, _GAP_SHARE = 1.7, 0.1
 """An interval so many times the usual is a gap, if no more than this part of all are."""
 _WINDOW = 4
 _DEGREE = 4
 _GAPS = (0, 1, 2, 3, 4, 5, 6, 8, 10)
 """Numbers of frames that may be missing, none first."""
-_VISIBLE = 2.5
+_LEAST_STEP = 2.5
 """Steps must be so many standard uncertainties long on either side of a gap."""
 _ROUGH = 3.0
 """Residual of smooth motion, in standard uncertainties, that a gap may be the reason of."""
 _SMOOTH = 20.0
 """The same where the gap is allowed for, at most: what is rougher is a jolt."""
-_EVEN = 0.2
+_SPEED_RATIO = 0.2
 """Least part of the steps after a gap that those before have, and the reverse: none where motion
 sets in, ends or jumps."""
-_JOLTING = 0.25
+_JOLT_RATIO = 0.25
 """Squared residuals on either side of a gap, over those across it; motion is rough where more."""
-_ASTRAY = 0.5
+_EXTRAPOLATION_ERROR = 0.5
 """Largest offset of a motion from what the speeds before and after a gap tell, over the way at the
 higher of them."""
-_BETTER = 0.2
+_IMPROVEMENT = 0.2
 """A gap must make the squared residuals of smooth motion so much smaller."""
 
 
@@ -54,17 +54,17 @@ def timing_faults(time: Floats, motion: Reals, sigma: Reals, same: Mask) -> Ints
     noise = np.array(
         [np.nanmedian(told) if np.isfinite(told).any() else np.inf for told in sigma[..., :2]]
     )
-    repeated = _repeated(same)
+    repeated = _duplicates(same)
     out = np.where(repeated, DUPLICATE, STEADY)
     if len(time) > 1 and np.median(np.diff(time)) > 0:
         steps = np.diff(time, prepend=2 * time[0] - time[1]) / np.median(np.diff(time))
-        gap = steps > _GAP
-        if gap.mean() < _SELDOM:
+        gap = steps > _GAP_RATIO
+        if gap.mean() < _GAP_SHARE:
             out[gap] = DROPPED
         if not has_uneven_intervals(np.cumsum(np.where(gap, 1.0, steps))):
             steps = np.round(steps)
         steps[repeated] = 0.0
-        out[_late(np.cumsum(steps), place, noise, repeated)] = DROPPED
+        out[_delayed(np.cumsum(steps), place, noise, repeated)] = DROPPED
     return out
 
 
@@ -81,17 +81,17 @@ def unrounded(time: Floats) -> Floats:
     return even - even[0] if np.abs(even - time).max() < _TICK else time
 
 
-def _repeated(same: Mask) -> Mask:
+def _duplicates(same: Mask) -> Mask:
     """Marks pictures that are shown again, but for long runs of one: there nothing moves."""
     run = np.split(np.arange(len(same)), np.flatnonzero(np.diff(same)) + 1)
     out = same.copy()
     for frames in run:
-        if len(frames) > _LONGEST:
+        if len(frames) > _LONGEST_RUN:
             out[frames] = False
     return out
 
 
-def _late(clock: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
+def _delayed(clock: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
     """Finds frames that come later than their clock (frames,) says, in usual intervals."""
     out = np.zeros(len(place), dtype=bool)
     shown = np.nonzero(~repeated)[0]
@@ -105,26 +105,28 @@ def _late(clock: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
         )
         if (
             rough
-            and _goes_on(near, noise[shown[middle]])
+            and _moves_steadily(near, noise[shown[middle]])
             and np.sqrt(rough[0]) > _ROUGH * noise[shown[middle]]
         ):
-            most = min(_BETTER * rough[0], (_SMOOTH * noise[shown[middle]]) ** 2)
+            most = min(_IMPROVEMENT * rough[0], (_SMOOTH * noise[shown[middle]]) ** 2)
             sides = [_roughness(clock[window[part]], near[part], 2) for part in (~after, after)]
-            leads = _leads_on(near, _GAPS[int(np.argmin(rough))])
-            out[shown[middle]] = min(rough) < most and max(sides) < _JOLTING * rough[0] and leads
+            extrapolates = _extrapolates(near, _GAPS[int(np.argmin(rough))])
+            out[shown[middle]] = (
+                min(rough) < most and max(sides) < _JOLT_RATIO * rough[0] and extrapolates
+            )
     return out
 
 
-def _goes_on(motion: Floats, noise: float) -> bool:
-    """Checks that motions (frames, n) are seen, and about as quick in both halves."""
+def _moves_steadily(motion: Floats, noise: float) -> bool:
+    """Tests motions (frames, n) for steps above the noise, of about one speed in both halves."""
     steps = np.sqrt(np.mean(np.diff(motion, axis=0) ** 2, axis=1))
     half = len(motion) // 2
     before, after = np.median(steps[: half - 1]), np.median(steps[half:])
-    return bool(min(before, after) > max(_EVEN * max(before, after), _VISIBLE * noise))
+    return bool(min(before, after) > max(_SPEED_RATIO * max(before, after), _LEAST_STEP * noise))
 
 
-def _leads_on(motion: Floats, missing: int) -> bool:
-    """Checks that motions (frames, n) reach the second half by about the speeds at both ends.
+def _extrapolates(motion: Floats, missing: int) -> bool:
+    """Tests whether speeds on both sides of a gap extrapolate motions (frames, n) across it.
 
     A polynomial joins any two straight ways smoothly if only the gap is long enough.
     """
@@ -132,11 +134,11 @@ def _leads_on(motion: Floats, missing: int) -> bool:
     before, across, after = np.diff(motion, axis=0)[half - 2 : half + 1]
     off = across - (missing + 1) * (before + after) / 2
     quickest = max(np.linalg.norm(before), np.linalg.norm(after))
-    return bool(np.linalg.norm(off) < _ASTRAY * (missing + 1) * quickest)
+    return bool(np.linalg.norm(off) < _EXTRAPOLATION_ERROR * (missing + 1) * quickest)
 
 
 def _roughness(clock: Floats, motion: Floats, degree: int = _DEGREE) -> float:
-    """Returns the mean square of what motions (frames, n) are off polynomials in time."""
+    """Computes the mean square residual of polynomials in time through motions (frames, n)."""
     basis = np.linalg.qr(np.vander((clock - clock.mean()) / np.ptp(clock), degree + 1))[0]
     rest = motion - basis @ (basis.T @ motion)
     return float(np.mean(rest**2))

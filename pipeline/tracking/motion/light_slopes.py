@@ -11,12 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.tracking.fit import PoseFits
-from pipeline.tracking.motion.uncertainty import residual_likeness
+from pipeline.tracking.motion.uncertainty import variance_inflation
 from sim.core import Mask
 
-_SURPRISE = 16.0
+_INNOVATION = 16.0
 """Square of an innovation over its covariance that begins anew, two degrees of freedom."""
-_STRAYING = 1.7
+_MEAN_INNOVATION = 1.7
 """Its running mean over two likewise: a slope that the filter runs behind."""
 _CHI_SQUARE = 0.455
 """Median of the square of a normal variable."""
@@ -25,7 +25,7 @@ _KEPT, _KEPT_OWN = 0.9, 0.8
 
 
 class LightSlopes:
-    """Knows the light's slopes over units (units, 2) by the frames so far.
+    """Filters the light's slopes over units (units, 2), frame by frame (Kalman).
 
     Args:
         units: number of them.
@@ -36,37 +36,37 @@ class LightSlopes:
         self._noisier = 1 + 1 / averaged
         self._mean = np.zeros((units, 2))
         self._variance = np.zeros((units, 2, 2))
-        self._walk = np.zeros(2)
-        self._straying = np.ones(units)
+        self._process_noise = np.zeros(2)
+        self._mean_innovation = np.ones(units)
 
     def apply(self, fits: PoseFits, good: Mask) -> None:
         """Corrects good fits (units,) in place for what is known of their slopes, and learns."""
-        coded = max(residual_likeness(fits), 1.0)
+        coded = max(variance_inflation(fits), 1.0)
         units = np.flatnonzero(good & np.isfinite(fits.curvature[:, 0, 0]))
         if not len(units):
             return
-        self._variance += np.diag(np.maximum(self._walk, 0.0))
+        self._variance += np.diag(np.maximum(self._process_noise, 0.0))
         white = fits.noise[units, None, None] ** 2
         covariance = self._noisier * coded * white * fits.curvature[units]
         known = self._variance[units]
-        surprise = fits.photometry[units, 2:] - self._mean[units]
+        innovation = fits.photometry[units, 2:] - self._mean[units]
         total = covariance[:, 3:, 3:] + known
         inverse = np.linalg.inv(total)
-        far = np.einsum("ui,uij,uj->u", surprise, inverse, surprise)
-        self._straying[units] += (1 - _KEPT_OWN) * (far / 2 - self._straying[units])
+        far = np.einsum("ui,uij,uj->u", innovation, inverse, innovation)
+        self._mean_innovation[units] += (1 - _KEPT_OWN) * (far / 2 - self._mean_innovation[units])
         spread = np.einsum("uii->ui", total)
-        excess = np.median(surprise**2, axis=0) / _CHI_SQUARE - np.median(spread, axis=0)
-        self._walk = _KEPT * self._walk + (1 - _KEPT) * excess
-        anew = (far > _SURPRISE) | (self._straying[units] > _STRAYING)
+        excess = np.median(innovation**2, axis=0) / _CHI_SQUARE - np.median(spread, axis=0)
+        self._process_noise = _KEPT * self._process_noise + (1 - _KEPT) * excess
+        anew = (far > _INNOVATION) | (self._mean_innovation[units] > _MEAN_INNOVATION)
         lost = units[anew]
         self._mean[lost], self._variance[lost] = fits.photometry[lost, 2:], covariance[anew, 3:, 3:]
-        self._straying[lost] = 1.0
+        self._mean_innovation[lost] = 1.0
         kept = units[~anew]
-        surprise, inverse, known = surprise[~anew], inverse[~anew], known[~anew]
-        self._mean[kept] += np.einsum("uij,ujk,uk->ui", known, inverse, surprise)
+        innovation, inverse, known = innovation[~anew], inverse[~anew], known[~anew]
+        self._mean[kept] += np.einsum("uij,ujk,uk->ui", known, inverse, innovation)
         self._variance[kept] -= known @ inverse @ known
         gain = covariance[~anew, :3, 3:] @ inverse
-        fits.pose[kept] -= np.einsum("uij,uj->ui", gain, surprise)
+        fits.pose[kept] -= np.einsum("uij,uj->ui", gain, innovation)
         fits.photometry[kept, 2:] = self._mean[kept]
         across = np.concatenate([np.broadcast_to(np.eye(3), (len(kept), 3, 3)), -gain], axis=2)
         for values, scale in ((fits.curvature, 1 / (coded * white[~anew])), (fits.scatter, 1.0)):

@@ -1,4 +1,4 @@
-"""Separates what units do together: a few shapes, whose amplitudes change in time.
+"""Separates motions into modes: a few shapes over the units, whose amplitudes change in time.
 
 Neighbours share most of them. Those of a structure with rough motions they do not share, but then
 these stand far above what noise alone makes up.
@@ -11,34 +11,34 @@ import numpy as np
 from sim.core import Floats, Ints, Mask
 
 _MOST = 30
-_SMOOTH = 0.75
+_LEAST_CORRELATION = 0.75
 """Correlation of neighbours in a singular vector that is a shape of motion."""
-_ABOVE = 3.0
+_SINGULAR_RATIO = 3.0
 """Or how far its singular value is above white noise: a codec's noise drifts, and so stands out."""
-_EMERGING = 2.858
+_NOISE_THRESHOLD = 2.858
 """Singular value, over the median, of a shape that is told from white noise (Gavish and Donoho,
 IEEE Trans. Inf. Theory 60 (2014) 5040)."""
-_COMMON = 8
-_FILLINGS, _FILLED = 80, 0.1
+_COMMON_ROUNDS = 8
+_IMPUTATIONS, _CONVERGED = 80, 0.1
 """Rounds in which missing motions are filled, at most; a change, over the noise, of no use."""
-_REACHES = (1, 2, 3, 4, 5, 6)
+_HALF_WINDOWS = (1, 2, 3, 4, 5, 6)
 """Frames to either side of one whose place the polynomial through them tells."""
-_TELLING = 4
+_LEAST_SAMPLES = 4
 """Fewest frames that tell how much a polynomial of higher order leaves."""
-_LITTLE_MORE = 1.3
-_SINGULAR, _TOLD = 1e6, 4.0
+_ORDER_TOLERANCE = 1.3
+_SINGULAR, _LARGEST_VARIANCE = 1e6, 4.0
 """Condition of what tells no shapes apart; largest variance of an amplitude that is told."""
-_JOLT = 3.0
-_TOGETHER = 3.0
-"""Likeness of neighbours' changes that is motion, over its standard deviation by chance."""
+_OUTLIER = 3.0
+_COHERENCE = 3.0
+"""Correlation of neighbours' changes that is motion, over its standard deviation by chance."""
 
 
 class MotionModes(NamedTuple):
-    """Holds motions taken apart."""
+    """Holds motions as modes and residuals."""
 
     amplitude: Floats  # (frames, n)
     shape: Floats  # (n, units)
-    rest: Floats  # (frames, units) what is left
+    residual: Floats  # (frames, units) what is left
 
 
 def separate_modes(motion: Floats, near: Ints, noise: float) -> MotionModes:
@@ -53,21 +53,21 @@ def separate_modes(motion: Floats, near: Ints, noise: float) -> MotionModes:
     """
     known = np.isfinite(motion)
     full = filled(motion)
-    for most in [_MOST] if known.all() else np.minimum(range(1, _FILLINGS), _MOST):
+    for most in [_MOST] if known.all() else np.minimum(range(1, _IMPUTATIONS), _MOST):
         left, values, right = np.linalg.svd(full, full_matrices=False)
-        floor = max(_EMERGING * float(np.median(values)), noise * np.sqrt(full.shape).sum())
-        count = _leading(values / floor, right[: min(most, len(values) // 2)], near)
+        floor = max(_NOISE_THRESHOLD * float(np.median(values)), noise * np.sqrt(full.shape).sum())
+        count = _count_modes(values / floor, right[: min(most, len(values) // 2)], near)
         amplitude, shape = left[:, :count] * values[:count], right[:count]
         low = amplitude @ shape
         change = np.sqrt(np.mean((full - low)[~known] ** 2)) if count and not known.all() else 0.0
-        full = np.where(known, motion, _completed(full, known, values[:count], shape, noise))
-        if change < _FILLED * noise and count < most:
+        full = np.where(known, motion, _impute(full, known, values[:count], shape, noise))
+        if change < _CONVERGED * noise and count < most:
             break
     return MotionModes(amplitude, shape, full - low)
 
 
-def _completed(full: Floats, known: Mask, values: Floats, shape: Floats, noise: float) -> Floats:
-    """Returns motions (frames, units) by shapes (n, units) whose amplitudes the known units tell.
+def _impute(full: Floats, known: Mask, values: Floats, shape: Floats, noise: float) -> Floats:
+    """Imputes motions (frames, units) by shapes (n, units), whose amplitudes the known units tell.
 
     Amplitudes are as likely large as their singular values (n,) say, and the less certain, the
     nearer to zero.
@@ -78,10 +78,13 @@ def _completed(full: Floats, known: Mask, values: Floats, shape: Floats, noise: 
     return np.asarray(told @ shape)
 
 
-def _leading(height: Floats, vectors: Floats, near: Ints) -> int:
+def _count_modes(height: Floats, vectors: Floats, near: Ints) -> int:
     """Counts the first singular vectors that are shapes of motion."""
     for count, (above, vector) in enumerate(zip(height, vectors, strict=False)):
-        if above < _ABOVE and abs(_likeness(vector, near)) < _SMOOTH:
+        if (
+            above < _SINGULAR_RATIO
+            and abs(_neighbour_correlation(vector, near)) < _LEAST_CORRELATION
+        ):
             return count
     return len(vectors)
 
@@ -94,7 +97,8 @@ def filled(motion: Floats) -> Floats:
     frames, seen = np.arange(len(motion)), known.any(axis=1)
     common = np.zeros(len(motion))
     apart = motion
-    for _ in range(_COMMON):  # units that are seen now and then are no reason for a common step
+    # units that are seen now and then are no reason for a common step
+    for _ in range(_COMMON_ROUNDS):
         more = np.nansum(apart, axis=1)[seen] / known.sum(axis=1)[seen]
         common += np.interp(frames, frames[seen], more) if seen.any() else 0.0
         apart = motion - common[:, None]
@@ -103,12 +107,12 @@ def filled(motion: Floats) -> Floats:
     apart = motion - common[:, None]
     for unit in np.nonzero(~known.all(axis=0))[0]:
         here = known[:, unit]
-        rest = np.interp(frames, frames[here], apart[here, unit]) if here.any() else 0.0
-        apart[:, unit] = np.where(here, apart[:, unit], rest)
+        between = np.interp(frames, frames[here], apart[here, unit]) if here.any() else 0.0
+        apart[:, unit] = np.where(here, apart[:, unit], between)
     return apart + common[:, None]
 
 
-def _likeness(shape: Floats, near: Ints) -> float:
+def _neighbour_correlation(shape: Floats, near: Ints) -> float:
     """Correlates a field over the units (units, ...) with the mean of the nearest ones."""
     around = shape[near].mean(axis=1)
     scale = np.sqrt(np.vdot(shape, shape) * np.vdot(around, around))
@@ -128,7 +132,7 @@ def count_at_rest(place: Floats, near: Ints) -> int:
     shown = np.nan_to_num(place)
     for frame in range(1, len(shown)):
         change = shown[frame] - shown[:frame].mean(axis=0)
-        if _likeness(change, near) > _TOGETHER / np.sqrt(len(near)):
+        if _neighbour_correlation(change, near) > _COHERENCE / np.sqrt(len(near)):
             return frame
     return len(shown)
 
@@ -154,7 +158,7 @@ def amplitude_variance(known: Mask, shape: Floats) -> Floats:
         normal = shape[:, units] @ shape[:, units].T
         if len(shape) and np.linalg.cond(normal) < _SINGULAR:
             out[frame] = np.diag(np.linalg.inv(normal))
-    return np.where(out < _TOLD, out, np.nan)
+    return np.where(out < _LARGEST_VARIANCE, out, np.nan)
 
 
 def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats, variance: Floats) -> Floats:
@@ -165,22 +169,24 @@ def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats, variance: Fl
     large. A jolt is motion too, so values are held to a few times the usual; frames at the ends are
     as the next. Values are those of a frame that shows all units, by the amplitudes' variance.
     """
-    found = [_differences(amplitude, steady, time, reach, variance) for reach in _REACHES]
+    found = [
+        _divided_differences(amplitude, steady, time, reach, variance) for reach in _HALF_WINDOWS
+    ]
     usual = np.full((len(found), amplitude.shape[1]), np.inf)
     for order, one in enumerate(found):
-        told = np.isfinite(one).sum(axis=0) >= _TELLING
+        told = np.isfinite(one).sum(axis=0) >= _LEAST_SAMPLES
         usual[order, told] = np.nanmedian(np.abs(one[:, told]), axis=0) / 0.6745
     out = np.zeros_like(amplitude)
     for column in np.flatnonzero(np.isfinite(usual[0])):
-        order = int(np.argmax(usual[:, column] <= _LITTLE_MORE * usual[:, column].min()))
-        values, most = found[order][:, column], _JOLT * usual[order, column]
+        order = int(np.argmax(usual[:, column] <= _ORDER_TOLERANCE * usual[:, column].min()))
+        values, most = found[order][:, column], _OUTLIER * usual[order, column]
         known = np.nonzero(np.isfinite(values))[0]
         values = np.interp(np.arange(len(values)), known, values[known])
         out[:, column] = np.clip(values, -most, most)
     return out
 
 
-def _differences(
+def _divided_differences(
     amplitude: Floats, steady: Mask, time: Floats, reach: int, variance: Floats
 ) -> Floats:
     """Returns divided differences (frames, n) over so many frames to either side.

@@ -39,12 +39,12 @@ class Neighbourhood:
 
     def __init__(self, centre: Floats) -> None:
         self._centre = centre
-        self._judged = np.zeros(0, dtype=bool)
-        self._voters: tuple[Ints, Ints, Floats, Floats]
+        self._neighbours_of = np.zeros(0, dtype=bool)
+        self._neighbours: tuple[Ints, Ints, Floats, Floats]
         self._apart = cKDTree(centre).query(centre, k=2)[0][:, 1]
 
     def collisions(self, found: Floats, good: Mask, least: float) -> Mask:
-        """Finds good units that claim one place: nearer than a part of their distance at rest."""
+        """Finds good units that collide: nearer than a part of their distance at rest."""
         out = np.zeros(len(found), dtype=bool)
         places = np.nonzero(good)[0]
         if len(places) < 2:
@@ -55,14 +55,14 @@ class Neighbourhood:
         out[places] = distance < least * usual
         return out
 
-    def predict_rigid(self, known: Floats, found: Floats, good: Mask, wanted: Mask) -> Floats:
-        """Predicts poses of the wanted units that move rigidly with the nearest good ones.
+    def predict_rigid(self, known: Floats, found: Floats, good: Mask, missing: Mask) -> Floats:
+        """Predicts poses of the missing units that move rigidly with the nearest good ones.
 
         Args:
             known: (units, 3) poses that all had before.
             found: (units, 3) poses of the good ones now.
             good: (units,) which those are.
-            wanted: (units,) whose poses to predict.
+            missing: (units,) whose poses to predict.
 
         Returns:
             (units, 3), NaN where nothing is known.
@@ -74,15 +74,15 @@ class Neighbourhood:
         places = np.nonzero(base)[0]
         old, new = (self._centre + pose[:, :2] for pose in (known, found))
         tree = cKDTree(old[places])
-        for unit in np.nonzero(wanted & np.isfinite(known[:, 0]))[0]:
+        for unit in np.nonzero(missing & np.isfinite(known[:, 0]))[0]:
             near = places[tree.query(old[unit], k=min(_NEAREST, len(places)))[1]]
             turn, shift = rigid_motion(old[near], new[near])
             moved = rotation_matrix(turn) @ old[unit] + shift
             out[unit] = (*(moved - self._centre[unit]), known[unit, 2] + turn)
         return out
 
-    def predict_affine(self, found: Floats, good: Mask, wanted: Mask) -> Floats:
-        """Predicts displacements (units, 2) of wanted units that move affinely with the good ones.
+    def predict_affine(self, found: Floats, good: Mask, missing: Mask) -> Floats:
+        """Predicts displacements (units, 2) of missing units that move affinely with the good ones.
 
         Other than `predict_rigid` it needs no past, and so does not drift while a unit is hidden.
         """
@@ -91,20 +91,20 @@ class Neighbourhood:
         if len(places) < _NEAREST:
             return out
         tree = cKDTree(self._centre[places])
-        for unit in np.nonzero(wanted)[0]:
+        for unit in np.nonzero(missing)[0]:
             near = places[tree.query(self._centre[unit], k=min(2 * _NEAREST, len(places)))[1]]
             rows = np.column_stack([self._centre[near] - self._centre[unit], np.ones(len(near))])
             out[unit] = np.linalg.lstsq(rows, found[near, :2], rcond=None)[0][2]
         return out
 
-    def rotation_size(self, found: Floats, good: Mask, wanted: Mask) -> Floats:
-        """Returns the median rotation (units,) of the good units about each wanted one, rad."""
+    def rotation_size(self, found: Floats, good: Mask, missing: Mask) -> Floats:
+        """Returns the median rotation (units,) of the good units about each missing one, rad."""
         out = np.full(len(found), np.nan)
         places = np.nonzero(good)[0]
         if len(places) < _NEAREST:
             return out
         tree = cKDTree(self._centre[places])
-        for unit in np.nonzero(wanted)[0]:
+        for unit in np.nonzero(missing)[0]:
             near = places[tree.query(self._centre[unit], k=_NEAREST)[1]]
             out[unit] = np.median(np.abs(found[near, 2]))
         return out
@@ -112,21 +112,21 @@ class Neighbourhood:
     def outliers(self, found: Floats, good: Mask, most: float) -> Mask:
         """Finds good units farther than ``most`` (mm) from where their neighbours carry them.
 
-        Only the nearest ones vote, and an affine map of them, so that strain is no stray.
+        The median over an affine map of the nearest ones decides, so that strain is no outlier.
         """
         out = np.zeros(len(found), dtype=bool)
         if np.count_nonzero(good) < 9:
             return out
-        if not np.array_equal(good, self._judged):
-            self._judged, self._voters = good.copy(), self._affine_voters(good)
-        places, near, offset, inverse = self._voters
+        if not np.array_equal(good, self._neighbours_of):
+            self._neighbours_of, self._neighbours = good.copy(), self._affine_neighbours(good)
+        places, near, offset, inverse = self._neighbours
         now = self._centre + found[:, :2]
         fit = inverse @ np.einsum("uki,ukj->uij", offset, now[near])
         middle = np.median(now[near] - offset @ fit, axis=1)
         out[places] = np.linalg.norm(now[places] - fit[:, 2] - middle, axis=1) > most
         return out
 
-    def _affine_voters(self, good: Mask) -> tuple[Ints, Ints, Floats, Floats]:
+    def _affine_neighbours(self, good: Mask) -> tuple[Ints, Ints, Floats, Floats]:
         """Lists good units (n,) with the nearest ones (n, 8), and what an affine map of them needs.
 
         That is their places (n, 8, 3) from the unit's own, with a one, and the inverse (n, 3, 3) of

@@ -21,7 +21,7 @@ _REACH = 2.0
 _LEAST, _RATIO = 4, 0.8
 _BLUR = 0.3
 """Standard deviation of the camera's, px."""
-_FADED = 1.75
+_FADE = 1.75
 """Distance within an outline at which half of a template's weight has faded in, px."""
 
 
@@ -39,7 +39,7 @@ def square(centre: Floats, side: int) -> Floats:
     return centre + 0.5 * (side - 1) * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
 
 
-def moved_outline(outline: Floats, centre: Floats, motion: Floats) -> Floats:
+def transform_outline(outline: Floats, centre: Floats, motion: Floats) -> Floats:
     """Moves an outline (n, 2) by shift and rotation (3,) about a centre (2,), px and rad."""
     return centre + motion[:2] + (outline - centre) @ rotation_matrix(motion[2]).T
 
@@ -69,31 +69,33 @@ def find_motion(patch: Patch) -> Floats | None:
     return np.append(matrix[:, :2] @ patch.centre + matrix[:, 2] - patch.centre, turn)
 
 
-def follow_patch(patch: Patch, *, whole: bool = False) -> Floats:
+def follow_patch(patch: Patch, *, include_edge: bool = False) -> Floats:
     """Finds shift and rotation (3,) unaided, however far they are; NaN if too little is seen.
 
     Args:
         patch: the patch.
-        whole: as of `fit_motion`.
+        include_edge: as of `fit_motion`.
     """
     start = find_motion(patch)
-    return np.full(3, np.nan) if start is None else fit_motion(patch, start, whole=whole)
+    return (
+        np.full(3, np.nan) if start is None else fit_motion(patch, start, include_edge=include_edge)
+    )
 
 
-def fit_motion(patch: Patch, start: Floats, *, whole: bool = False) -> Floats:
+def fit_motion(patch: Patch, start: Floats, *, include_edge: bool = False) -> Floats:
     """Fits shift and rotation (3,) by correlation of the pixels; NaN where that fails.
 
     Args:
         patch: the patch.
         start: (3,) near the motion.
-        whole: whether pixels at the very edge count as well, for patches that lie within a part;
-            by default their weight fades out, since what is beyond may move otherwise.
+        include_edge: whether pixels at the very edge count as well, for patches that lie within a
+            part; by default their weight fades out, since what is beyond may move otherwise.
     """
     rows, columns = patch.before.shape
     camera = Camera(np.eye(3), np.array([columns, rows]) / 2 - 0.5, np.zeros(2), (columns, rows))
     outline = patch.outline - patch.centre
-    if whole:
-        wider = Polygon(outline).buffer(_FADED, join_style="mitre")
+    if include_edge:
+        wider = Polygon(outline).buffer(_FADE, join_style="mitre")
         outline = np.array(wider.exterior.coords)[:-1]
     if cv2.contourArea(outline.astype(np.float32), oriented=True) < 0:
         outline = outline[::-1]

@@ -10,21 +10,21 @@ from sim.core import Floats, Ints, Reals
 
 _KNOTS, _FEWEST = 7, 4
 """Frames that a polynomial passes through, at most and at least."""
-_SLOWEST = 0.56
+_LARGEST_RATIO = 0.56
 """Square of the ratio of what an order changes to that of the one before, at most; what the orders
 beyond change goes on so."""
-_PART = 400
+_CHUNK = 400
 """Frames that are looked at together, beside some before and after."""
-_FEW = 9
+_LEAST_UNITS = 9
 """Units, below which shapes that they share do not stand out."""
 
 
-class _Carried(NamedTuple):
+class _Interpolated(NamedTuple):
     """Holds poses (frames, units) at frames' times."""
 
     pose: Floats  # of one degree of freedom
     growth: Floats  # of their variance, over that of the poses seen
-    left: Floats  # square of what the highest order changes
+    truncation: Floats  # square of what the highest order changes
 
 
 def at_frame_times(
@@ -57,34 +57,38 @@ def at_frame_times(
         Poses; their uncertainties by that of the poses they are made of; and the variance by what
         is not known of the motion in between, and of the reference.
     """
-    out, grown, left = motion.copy(), np.ones_like(motion), np.zeros_like(motion)
-    for begin in range(0, len(motion), _PART):
+    out, grown, truncation = motion.copy(), np.ones_like(motion), np.zeros_like(motion)
+    for begin in range(0, len(motion), _CHUNK):
         first = max(begin - _KNOTS, 0)
-        part = slice(first, begin + _PART + _KNOTS)
-        core = slice(begin, begin + _PART)
+        part = slice(first, begin + _CHUNK + _KNOTS)
+        core = slice(begin, begin + _CHUNK)
         if len(time[part]) <= _FEWEST:
             continue
         lag = np.where(np.isfinite(late[part]), late[part], 0.0)
         for dof in range(motion.shape[2]):
-            shown, told = (values[part, :, dof].astype(float) for values in (motion, sigma))
-            found = _carried(shown, told, time[part], lag, bend[part, :, dof].astype(float), near)
-            for values, new in zip((out, grown, left), found, strict=True):
-                values[core, :, dof] = new[begin - first :][:_PART]
+            shown, error = (values[part, :, dof].astype(float) for values in (motion, sigma))
+            found = _interpolate(
+                shown, error, time[part], lag, bend[part, :, dof].astype(float), near
+            )
+            for values, new in zip((out, grown, truncation), found, strict=True):
+                values[core, :, dof] = new[begin - first :][:_CHUNK]
     own, rest = averaged / (averaged + 1), 1 / (averaged + 1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # some units are not seen at rest
-        origin = np.nan_to_num([np.nanmean(one[:averaged], axis=0) for one in (left, grown - 1)])
-    missed = left + origin[0] + np.nan_to_num(sigma) ** 2 * rest * origin[1]
+        origin = np.nan_to_num(
+            [np.nanmean(one[:averaged], axis=0) for one in (truncation, grown - 1)]
+        )
+    missed = truncation + origin[0] + np.nan_to_num(sigma) ** 2 * rest * origin[1]
     return out, sigma * np.sqrt(own * grown + rest), np.maximum(missed, 0.0)
 
 
-def _carried(
-    shown: Floats, told: Floats, time: Floats, late: Floats, bend: Floats, near: Ints
-) -> _Carried:
-    """Carries poses (frames, units) to the frames' times."""
+def _interpolate(
+    shown: Floats, sigma: Floats, time: Floats, late: Floats, bend: Floats, near: Ints
+) -> _Interpolated:
+    """Interpolates poses (frames, units) at the frames' times."""
     together, share = motion_modes.filled(shown), np.ones(shown.shape[1])
-    if shown.shape[1] >= _FEW and np.isfinite(told).any():
-        found = motion_modes.separate_modes(shown, near, float(np.nanmedian(told)))
+    if shown.shape[1] >= _LEAST_UNITS and np.isfinite(sigma).any():
+        found = motion_modes.separate_modes(shown, near, float(np.nanmedian(sigma)))
         together, share = found.amplitude @ found.shape, np.sum(found.shape**2, axis=0)
     changes, growths = [], []
     for knots in range(_FEWEST, min(_KNOTS + 1, len(time)) + 1):
@@ -94,14 +98,16 @@ def _carried(
         )
         growths.append(share * np.sum(weight**2, axis=2))
     change, growth = np.array(changes), np.array(growths)
-    off = (change[:-1] - change[-1]) ** 2 - growth[-1] * told**2
-    error = np.nansum(off / told**2 + np.where(np.isfinite(told), growth[:-1], 0.0), axis=2)
+    off = (change[:-1] - change[-1]) ** 2 - growth[-1] * sigma**2
+    error = np.nansum(off / sigma**2 + np.where(np.isfinite(sigma), growth[:-1], 0.0), axis=2)
     best = np.argmin(error, axis=0), np.arange(len(time))  # all units tell of the order
     step = np.diff(change, axis=0)[-3:]
     size = np.nanmean(step**2, axis=2)
-    ratio = np.minimum(np.sqrt(size[-1:] / np.maximum(size[:1], 1e-30)), _SLOWEST)[0][:, None]
-    left = np.nan_to_num(np.maximum(off[best], 0.0) + ratio * step[-2:][0] ** 2)
-    return _Carried(shown + change[best], 1 + growth[best], left / (1 - np.sqrt(ratio)) ** 2)
+    ratio = np.minimum(np.sqrt(size[-1:] / np.maximum(size[:1], 1e-30)), _LARGEST_RATIO)[0][:, None]
+    truncation = np.nan_to_num(np.maximum(off[best], 0.0) + ratio * step[-2:][0] ** 2)
+    return _Interpolated(
+        shown + change[best], 1 + growth[best], truncation / (1 - np.sqrt(ratio)) ** 2
+    )
 
 
 def middle_speed(motion: Reals, time: Floats, frame: int) -> Floats:

@@ -10,27 +10,33 @@ from pipeline.tracking.detect import LatticePlace
 from pipeline.tracking.fit import PoseFits
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.prediction import latest_velocity
-from pipeline.tracking.motion.unit_looks import HIDDEN, SHARE, STRAYED, UnitLooks, white_share
+from pipeline.tracking.motion.unit_appearance import (
+    HIDDEN,
+    SHARE,
+    STRAYED,
+    ReferenceAppearance,
+    white_share,
+)
 from pipeline.tracking.motion.unit_search import UnitSearch, UnitStates, gain_change
 from sim.core import Floats, Ints, Mask, Reals
 
 LOG = logging.getLogger(__name__)
 
-_PAST = 3
+_VELOCITY_FRAMES = 3
 """Frames before one that tell of its velocities."""
-_FEW, _HALF = 0.9, 0.5
+_JUMP_SHARE, _FOUND_SHARE = 0.9, 0.5
 """Part of the units below which the specimen may have jumped; with as many found in another place,
 it has."""
-_WHOLE = 0.8
+_NEARLY_ALL = 0.8
 """Part of the units that must be found for their poses to be those looked for after a loss."""
-_OWN_TURNS = np.deg2rad([0, 15, -15, 30, -30])
+_UNIT_TURNS = np.deg2rad([0, 15, -15, 30, -30])
 """Tried of every unit, beside the turn of a lattice that is found again; the first that fits. None
 but the first unless nearly all are in view, since a lattice turned so may lie a unit aside."""
-_OTHER_TURN = np.deg2rad(20.0)
+_TURN_DIFFERENCE = np.deg2rad(20.0)
 """Between turns at which a lattice may look alike."""
 _MOST_TURN = np.deg2rad(45.0)
 """Within a frame of a specimen in sight: half of the turn that leaves squares as they were."""
-_FACE = 0.5
+_FACE_RADIUS = 0.5
 """Part of a unit's reach within which it shows its face alone."""
 
 
@@ -50,8 +56,8 @@ class _Trial(NamedTuple):
     enough: bool
 
 
-def _otherwise_turned(one: LatticePlace, other: LatticePlace) -> bool:
-    return bool(np.abs(np.angle(np.exp(1j * (one.turn - other.turn)))) > _OTHER_TURN)
+def _differ_in_turn(one: LatticePlace, other: LatticePlace) -> bool:
+    return bool(np.abs(np.angle(np.exp(1j * (one.turn - other.turn)))) > _TURN_DIFFERENCE)
 
 
 def _turn_between(pose: Floats, other: Floats) -> float:
@@ -69,7 +75,7 @@ class Tracker:
         seen: (units,) which are not hidden in the first frame; others have no reference.
 
     Attributes:
-        exposure: of a row, measured if it is not told.
+        exposure: of a row, measured if it is not given.
     """
 
     def __init__(
@@ -77,17 +83,17 @@ class Tracker:
     ) -> None:
         self._search, self._slopes = search, slopes
         self.exposure, self._relocaliser = search.exposure, search.relocaliser
-        self._past: list[tuple[float, Floats]] = []
+        self._history: list[tuple[float, Floats]] = []
         self._out_of_sight, self._time = False, 0.0
         self._centre = search.fitter.templates.centre
         self._seen = np.ones(len(self._centre), bool) if seen is None else seen
         pose, photometry = search.fitter.start(1.0)
         self._known = UnitStates(pose, np.zeros_like(pose), photometry, np.zeros(len(pose)))
-        self._whole = pose
+        self._last_complete = pose
 
     def step(self, image: Picture, time: float) -> TrackedFrame:
         """Finds the units in the next frame, at a time in s."""
-        first = self._search.looks is None
+        first = self._search.appearance is None
         interval, self._time = 0.0 if first else time - self._time, time
         known = self._known = self._known._replace(interval=interval)
         fits = self._search.fit(image, known, self._search.predicted(known), known.photometry)
@@ -95,20 +101,20 @@ class Tracker:
             self._search.refit_missed(image, known, fits)
         if not first and self._search.allows_motion:
             known = self._known = self._with_velocity(fits.pose)
-            if self.exposure.open:
+            if self.exposure.measuring:
                 self._measure_exposure(image, fits)
             if self._search.shutter.readout or self.exposure.time:
                 fits = self._search.fit(image, known, fits.pose, fits.photometry)
         if first:
             templates, noise = self._search.fitter.templates, self._search.shutter.noise
-            self._search.looks = UnitLooks(fits, templates, noise, self._seen)
+            self._search.appearance = ReferenceAppearance(fits, templates, noise, self._seen)
             self._search.fitter.full = np.nan_to_num(fits.information)
         good = self._search.complete(image, known, fits, self._search.accepted(fits, known))
-        jumped = good.mean() < _FEW
+        jumped = good.mean() < _JUMP_SHARE
         if jumped and not first:
             fits, good = self._relocalise(image, fits, good)
         in_view = self._relocaliser.in_view(self._known.pose)
-        if self._out_of_sight and good.sum() <= _HALF * in_view.sum():
+        if self._out_of_sight and good.sum() <= _FOUND_SHARE * in_view.sum():
             good[:] = False  # a few may be others, a unit aside
         good &= ~self._search.collisions(fits, good)
         quality = self._reasons(image, fits, good)
@@ -126,51 +132,53 @@ class Tracker:
 
     def _measure_exposure(self, image: Picture, fits: PoseFits) -> None:
         known = self._known
-        way = np.linalg.norm(known.velocity[:, :2], axis=1) * known.interval
+        travel = np.linalg.norm(known.velocity[:, :2], axis=1) * known.interval
         there = self._search.accepted(fits, known, sharp=False)
-        there &= np.isfinite([pose[:, 0] for _, pose in self._past]).all(axis=0)
-        if len(self._past) < 2:
+        there &= np.isfinite([pose[:, 0] for _, pose in self._history]).all(axis=0)
+        if len(self._history) < 2:
             return
 
-        def left(chosen: Mask) -> Floats:
+        def residuals_of(chosen: Mask) -> Floats:
             """Residuals of units fitted again, in gains of the frame before."""
             again = self._search.fit(image, known, fits.pose, fits.photometry, chosen)
             return (again.noise / known.photometry[:, 0])[chosen]
 
         pixel = self._search.pixel
-        self.exposure.measure(self._time, known.interval, way, pixel, there, left)
+        self.exposure.measure(self._time, known.interval, travel, pixel, there, residuals_of)
 
     def _with_velocity(self, pose: Floats) -> UnitStates:
-        """Takes the velocities at this frame from the poses of it and of those before."""
-        now = latest_velocity([*self._past, (self._time, pose)])
+        """Computes the velocities at this frame from its poses and those before."""
+        now = latest_velocity([*self._history, (self._time, pose)])
         return self._known._replace(velocity=np.where(np.isfinite(now), now, self._known.velocity))
 
     def _reasons(self, image: Picture, fits: PoseFits, good: Mask) -> Ints:
-        """Says why units are missing, by what the frame shows where they were last."""
-        assert self._search.looks is not None, "the first frame is the reference"
+        """Classifies why units are missing, by what the frame shows at their last places."""
+        assert self._search.appearance is not None, "the first frame is the reference"
         pose, lost, white = self._known.pose, np.flatnonzero(~good), np.zeros(len(good))
         middle = self._search.fitter.camera.project(self._centre[lost] + pose[lost, :2])
-        reach = _FACE * self._search.fitter.templates.reach[lost] / self._search.pixel
+        reach = _FACE_RADIUS * self._search.fitter.templates.reach[lost] / self._search.pixel
         white[lost] = white_share(image, middle, reach)
-        reasons = self._search.looks.reasons(fits, good, self._relocaliser.in_view(pose), white)
+        reasons = self._search.appearance.reasons(
+            fits, good, self._relocaliser.in_view(pose), white
+        )
         hidden = (reasons == HIDDEN) & self._seen
         if hidden.any():
             now = np.where(good[:, None], fits.pose, pose)
-            reasons[hidden & self._relocaliser.near_unclaimed(image, now, good)] = STRAYED
+            reasons[hidden & self._relocaliser.near_unassigned(image, now, good)] = STRAYED
         return reasons
 
     def _relocalise(self, image: Picture, fits: PoseFits, good: Mask) -> tuple[PoseFits, Mask]:
         """Tries all units anew where the lattice is found; keeps what is more."""
         now = np.where(good[:, None], fits.pose, np.nan)
-        places = self._relocaliser.placed_again(image, self._whole, now)
+        places = self._relocaliser.find_lattice(image, self._last_complete, now)
         if not self._out_of_sight:  # from one frame to the next it turns by less than to look alike
             before = self._known.pose
             places = [place for place in places if _turn_between(place.pose, before) < _MOST_TURN]
         if not places:
             return fits, good
-        most = self._relocaliser.in_view(places[0].pose).mean() > _WHOLE
-        for own in _OWN_TURNS if most else _OWN_TURNS[:1]:
-            tried = self._tried(image, fits, places, own)
+        most = self._relocaliser.in_view(places[0].pose).mean() > _NEARLY_ALL
+        for own in _UNIT_TURNS if most else _UNIT_TURNS[:1]:
+            tried = self._fit_places(image, fits, places, own)
             enough = [trial for trial in tried if trial.enough]
             if enough:
                 break
@@ -187,7 +195,7 @@ class Tracker:
         # where it was last, rows that come in may lie as other rows did
         return fits, good & (not self._out_of_sight)
 
-    def _tried(
+    def _fit_places(
         self, image: Picture, fits: PoseFits, places: list[LatticePlace], own: float
     ) -> list[_Trial]:
         """Fits all units where the lattice may be, each turned by some angle of its own.
@@ -197,23 +205,23 @@ class Tracker:
         out: list[_Trial] = []
         for place in places:
             enough = [trial.place for trial in out if trial.enough]
-            if enough and not self._out_of_sight and _otherwise_turned(enough[0], place):
+            if enough and not self._out_of_sight and _differ_in_turn(enough[0], place):
                 break
             again, none = fits.copy(), np.zeros(len(place.pose), bool)
             there = self._known._replace(pose=place.pose)
             trial = place.pose + np.array([0.0, 0.0, own]), there.photometry, None, SHARE
             good = self._search.try_missing(image, there, again, none, trial)
-            most = _HALF * self._relocaliser.in_view(place.pose).sum()
+            most = _FOUND_SHARE * self._relocaliser.in_view(place.pose).sum()
             out.append(_Trial(place, again, good, bool(good.sum() > most)))
         return out
 
     def _is_least_turn(self, best: LatticePlace, other: LatticePlace) -> bool:
-        """Tells whether one of two places that fit is right, for its turn is the lesser one.
+        """Tests whether one of two places that fit is right, for its turn is the lesser one.
 
         After a specimen was out of sight this is a guess, of which a warning tells, and none where
         it may be another part of the lattice that is in view.
         """
-        if not _otherwise_turned(best, other):
+        if not _differ_in_turn(best, other):
             return False
         if self._out_of_sight:
             if not self._relocaliser.in_view(best.pose).all():
@@ -238,7 +246,7 @@ class Tracker:
         usual = known.usual if still else np.where(good, relative, known.usual)
         self._out_of_sight = not good.any()
         seen = np.where(good[:, None], fits.pose, np.nan)
-        self._past = [*self._past, (self._time, seen)][-_PAST:]
+        self._history = [*self._history, (self._time, seen)][-_VELOCITY_FRAMES:]
         self._known = UnitStates(pose, velocity, photometry, usual)
-        if good.mean() > _WHOLE:
-            self._whole = pose
+        if good.mean() > _NEARLY_ALL:
+            self._last_complete = pose

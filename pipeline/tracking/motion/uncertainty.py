@@ -20,19 +20,19 @@ from sim.core import Floats, Ints, Mask, Reals
 _PARAMETERS = 7
 _LEAST_FRAMES = 8
 _MOST_FRAMES = 400
-_OUTLIER = 25.0
+_OUTLIER_RATIO = 25.0
 _CHI_SQUARE = 0.455
 """Median of the square of a normal variable."""
-_PRIOR = 10.0
+_PRIOR_WEIGHT = 10.0
 """Weight, in samples, of the belief that a unit or frame is as all others are."""
-_USUAL = 6.0
+_CODEC_FACTOR = 6.0
 """By how much codecs make variances larger than the image tells, and the weight of this belief in
 frames: few frames do not show how their errors drift."""
-_USUAL_FRAMES = 2.0
-_FRAMES_OWN = 0.5
+_CODEC_WEIGHT = 2.0
+_FRAME_SHARE = 0.5
 """Least part of the variance by the image that is a frame's own, the rest being the reference's."""
 _LEAST_FREEDOM = 0.2
-_OWN = 0.3
+_KEPT_DEVIATION = 0.3
 _JITTER = 4.0
 """Variance by which a codec shows frames at other times, at most, over that of its noise; what is
 more is a motion too quick, or seen in too few frames, to be followed."""
@@ -54,8 +54,8 @@ def median_uncertainty(sigma: Reals) -> tuple[float, float]:
     return float(np.hypot(x, y) / np.sqrt(2)), float(turn)
 
 
-def residual_likeness(fits: PoseFits) -> float:
-    """Returns the variance that blocks of residuals tell, over that of white ones: one or more."""
+def variance_inflation(fits: PoseFits) -> float:
+    """Estimates the variance by correlated residuals over that by white ones: one or more."""
     white = np.einsum("uii->ui", fits.curvature)[:, :3] * fits.noise[:, None] ** 2
     ratio = standard_errors(fits.scatter, fits.blocks) ** 2 / white
     return float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else np.nan
@@ -91,12 +91,12 @@ def calibrate_sigma(
     parts = np.array_split(np.arange(len(motion)), -(-len(motion) // _MOST_FRAMES))
     for part in (slice(frames[0], frames[-1] + 1) for frames in parts):
         seen = motion[part].astype(float), sigma[part].astype(float)
-        out[part] = _calibrated(*seen, near, steady[part], time[part], reference, coded)
+        out[part] = _calibrate(*seen, near, steady[part], time[part], reference, coded)
         del seen  # before the next part's
     return out
 
 
-def _calibrated(
+def _calibrate(
     motion: Floats,
     sigma: Floats,
     near: Ints,
@@ -106,8 +106,8 @@ def _calibrated(
     coded: bool,
 ) -> Floats:
     """Scales the uncertainties of some frames as ``calibrate_sigma`` does."""
-    told = _calmed(sigma)
-    factors, shares = _found(motion, told, near, steady, time, coded)
+    told = _regularised(sigma)
+    factors, shares = _variance_factors(motion, told, near, steady, time, coded)
     return np.asarray(told * np.sqrt(factors + reference * shares))
 
 
@@ -116,8 +116,8 @@ def nearest(centre: Floats) -> Ints:
     return np.asarray(cKDTree(centre).query(centre, k=min(4, len(centre)))[1][:, 1:])
 
 
-def _calmed(sigma: Floats) -> Floats:
-    """Draws the image's figures near to what is usual for frame and unit.
+def _regularised(sigma: Floats) -> Floats:
+    """Shrinks the image's uncertainties towards the medians of their frame and unit.
 
     A figure comes from some tens of blocks and scatters by a fifth, most of which says nothing.
     """
@@ -126,10 +126,10 @@ def _calmed(sigma: Floats) -> Floats:
         warnings.simplefilter("ignore", RuntimeWarning)  # nothing is seen in some frames
         frame = np.nanmedian(told, axis=1, keepdims=True)
         unit = np.nanmedian(told - frame, axis=0, keepdims=True)
-    return np.exp(frame + unit + _OWN * (told - frame - unit))
+    return np.exp(frame + unit + _KEPT_DEVIATION * (told - frame - unit))
 
 
-def _found(
+def _variance_factors(
     motion: Floats, sigma: Floats, near: Ints, steady: Mask, time: Floats, coded: bool
 ) -> tuple[Floats, Floats]:
     """Returns factors (frames, units, 3) by which variances are too small.
@@ -138,7 +138,7 @@ def _found(
     Less scatter than a frame's own noise has is no codec's: residuals are alike within blocks by
     what they do not hold of the light, and tell too much of the reference's error as well.
     """
-    usual = _USUAL if coded else 1.0
+    usual = _CODEC_FACTOR if coded else 1.0
     factors, shares, levels = np.full(motion.shape, usual), np.zeros(3), np.full(3, np.nan)
     for dof in range(3 if len(motion) >= _LEAST_FRAMES else 0):
         shown, told = motion[..., dof], sigma[..., dof]
@@ -148,22 +148,22 @@ def _found(
         noise = _noise(np.isfinite(shown), found)
         if coded:
             noise += _jitter(noise, found, steady, time)
-        ratio = _ratio(noise, told)
+        ratio = _variance_ratio(noise, told)
         if not np.isfinite(ratio).any():
             continue
         levels[dof] = level = float(np.nanmean(ratio[1:]))  # the first frame is the reference
-        factors[..., dof] = _factors(ratio, level, usual)
+        factors[..., dof] = _combined_factors(ratio, level, usual)
         shares[dof] = motion_modes.constant_share(found.amplitude)
-    if coded and np.median(levels) < _FRAMES_OWN:
-        return _found(motion, sigma, near, steady, time, coded=False)
-    return factors, shares * np.fmin(levels / _FRAMES_OWN, 1.0)
+    if coded and np.median(levels) < _FRAME_SHARE:
+        return _variance_factors(motion, sigma, near, steady, time, coded=False)
+    return factors, shares * np.fmin(levels / _FRAME_SHARE, 1.0)
 
 
-def _factors(ratio: Floats, level: float, usual: float) -> Floats:
-    """Returns factors (frames, units) by frame and unit, drawn near to what is usual."""
-    by_frame = _shrunk(ratio, level, 1)
-    by_unit = _shrunk(ratio / by_frame[:, None], 1.0, 0)
-    belief = (level * len(ratio) + usual * _USUAL_FRAMES) / (len(ratio) + _USUAL_FRAMES)
+def _combined_factors(ratio: Floats, level: float, usual: float) -> Floats:
+    """Computes factors (frames, units) by frame and unit, shrunk towards the usual one."""
+    by_frame = _shrunk_mean(ratio, level, 1)
+    by_unit = _shrunk_mean(ratio / by_frame[:, None], 1.0, 0)
+    belief = (level * len(ratio) + usual * _CODEC_WEIGHT) / (len(ratio) + _CODEC_WEIGHT)
     return np.asarray(by_frame[:, None] * by_unit[None, :] * belief / level)
 
 
@@ -171,7 +171,7 @@ def _noise(known: Mask, found: motion_modes.MotionModes) -> Floats:
     """Returns squared noise (frames, units) in what the shapes leave, NaN if unseen."""
     by_frame, by_unit = motion_modes.leverage(found.amplitude), motion_modes.leverage(found.shape.T)
     freedom = (1 - by_frame)[:, None] * (1 - by_unit)
-    noise = found.rest**2 / np.maximum(freedom, _LEAST_FREEDOM)
+    noise = found.residual**2 / np.maximum(freedom, _LEAST_FREEDOM)
     return np.where(known & (freedom > _LEAST_FREEDOM), noise, np.nan)
 
 
@@ -188,14 +188,14 @@ def _jitter(noise: Floats, found: motion_modes.MotionModes, steady: Mask, time: 
     return np.clip(moved**2 - own, 0.0, _JITTER * usual)
 
 
-def _ratio(spread: Floats, sigma: Floats) -> Floats:
-    """Returns squared noise over the image's variance (frames, units), held to a few times it."""
+def _variance_ratio(spread: Floats, sigma: Floats) -> Floats:
+    """Computes squared noise over the image's variance (frames, units), outliers clipped."""
     ratio = spread / sigma**2
     if not np.isfinite(ratio).any():
         return ratio
-    return np.minimum(ratio, _OUTLIER * np.nanmedian(ratio) / _CHI_SQUARE)
+    return np.minimum(ratio, _OUTLIER_RATIO * np.nanmedian(ratio) / _CHI_SQUARE)
 
 
-def _shrunk(ratio: Floats, level: float, axis: int) -> Floats:
+def _shrunk_mean(ratio: Floats, level: float, axis: int) -> Floats:
     count = np.isfinite(ratio).sum(axis=axis)
-    return (np.nansum(ratio, axis=axis) + _PRIOR * level) / (count + _PRIOR)
+    return (np.nansum(ratio, axis=axis) + _PRIOR_WEIGHT * level) / (count + _PRIOR_WEIGHT)

@@ -1,4 +1,4 @@
-"""Searches the units in one frame: fits them from guesses, judges them, looks where others say."""
+"""Searches the units in one frame: fits from guesses, accepts, predicts by neighbours."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from pipeline.tracking.fit import CoarseLevel, ExposureBlur, PoseFits, PoseFitte
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion.exposure_meter import ExposureMeter
 from pipeline.tracking.motion.prediction import Neighbourhood
-from pipeline.tracking.motion.unit_looks import SHARE, SHARE_KNOWN, UnitLooks
+from pipeline.tracking.motion.unit_appearance import SHARE, SHARE_KNOWN, ReferenceAppearance
 from sim.core import Floats, Mask, Reals
 
 _QUICK = 2.0
@@ -20,10 +20,10 @@ _STRAY = 0.25
 """A unit so far from where its neighbours carry it is another one, or none, pitches."""
 _TURNED = 0.5
 """Or so far turned from there, rad."""
-_TIGHT = 6.0
-_SEEN = 0.5
+_ROBUST_SCALE = 6.0
+_RIM = 0.5
 """Part of a unit's radius by which its middle may lie out of the picture."""
-_CLOSE = 0.5
+_COLLISION_DISTANCE = 0.5
 """Two units nearer to each other than this part of their least distance at rest are one."""
 _ROUNDS = 40
 _RETRIES = 4
@@ -55,7 +55,7 @@ class UnitSearch:
 
     Args:
         specimen: the units.
-        fitter: the camera and the units' looks.
+        fitter: the camera and the units' templates.
         relocaliser: tells what is in view.
         walls: of thick units.
         shutter: of the camera.
@@ -64,8 +64,8 @@ class UnitSearch:
 
     Attributes:
         fitter, relocaliser, shutter: as given.
-        exposure: of a row, measured if it is not told.
-        looks: of the units in the first frame, once it is there.
+        exposure: of a row, measured if it is not given.
+        appearance: of the units in the first frame, once it is there.
         neighbours: which units tell where others are.
         pixel: size of a pixel at the middle of the specimen, mm.
     """
@@ -83,7 +83,7 @@ class UnitSearch:
         self.fitter, self.relocaliser, self._walls = fitter, relocaliser, walls
         self.shutter, self._blur, self._coarse = shutter, blur, coarse
         self.exposure = ExposureMeter(shutter.exposure, fitter.templates.noise, blur is not None)
-        self.looks: UnitLooks | None = None
+        self.appearance: ReferenceAppearance | None = None
         self.neighbours = Neighbourhood(specimen.centre)
         self._stray = _STRAY * specimen.pitch
         middle = specimen.centre.mean(axis=0)
@@ -112,10 +112,10 @@ class UnitSearch:
         rows = self.fitter.camera.size[1]
         drift = known.velocity * (self.shutter.readout / rows) if self.shutter.readout else None
         if self._blur is not None:
-            way = known.velocity * self.exposure.time
+            travel = known.velocity * self.exposure.time
             cos, sin = np.cos(known.pose[:, 2]), np.sin(known.pose[:, 2])
-            x, y = way[:, 0], way[:, 1]
-            own = np.stack([cos * x + sin * y, cos * y - sin * x, way[:, 2]], axis=1)
+            x, y = travel[:, 0], travel[:, 1]
+            own = np.stack([cos * x + sin * y, cos * y - sin * x, travel[:, 2]], axis=1)
             self._blur.redraw(own, chosen)
         usual = known.usual if chosen is None else None
         return self.fitter.fit(image, pose, photometry, chosen, tight, usual, drift)
@@ -148,7 +148,7 @@ class UnitSearch:
 
     @property
     def allows_motion(self) -> bool:
-        """Tells whether units are fitted as they move while a frame is exposed or read out."""
+        """Tests whether units are fitted as they move while a frame is exposed or read out."""
         return bool(self.shutter.readout) or self._blur is not None
 
     @property
@@ -160,15 +160,15 @@ class UnitSearch:
     def accepted(
         self, fits: PoseFits, known: UnitStates, share: float = SHARE, sharp: bool = True
     ) -> Mask:
-        """Judges fits; one that its motion may have blurred needs to be seen whole."""
-        assert self.looks is not None, "the first frame is the reference"
+        """Accepts fits; one that its motion may have blurred needs to be seen whole."""
+        assert self.appearance is not None, "the first frame is the reference"
         quick = None
         if sharp and not self.exposure.time and known.interval > 0:
             quick = np.linalg.norm((fits.pose - known.pose)[:, :2], axis=1) > _QUICK * self.pixel
-        return self.looks.accepted(fits, known.photometry, share, quick)
+        return self.appearance.accepted(fits, known.photometry, share, quick)
 
     def complete(self, image: Picture, known: UnitStates, fits: PoseFits, good: Mask) -> Mask:
-        """Looks for what is missing, where the good ones say; fits are filled in place."""
+        """Fits missing units at predictions by the good ones; fits are filled in place."""
         if not good.any():
             return good
         return self._retry_hidden(image, known, fits, self._propagate(image, known, fits, good))
@@ -181,17 +181,17 @@ class UnitSearch:
         good: Mask,
         trial: tuple[Floats, Floats, Floats | None, float],
     ) -> Mask:
-        """Fits what is not good from a guess and keeps what is accepted and has not strayed.
+        """Fits missing units from a guess; keeps those accepted near it, but for outliers.
 
         A trial is the guess of poses, photometry, the scale of residuals where the pose is nearly
         known, and the least share of a unit's information.
         """
         guess, photometry, tight, least = trial
-        wanted = ~good & self._reachable(guess)
-        if not wanted.any():
+        missing = ~good & self._reachable(guess)
+        if not missing.any():
             return good
-        again = self.fit(image, known, guess, photometry, wanted, tight)
-        new = self.accepted(again, known, least) & wanted & self._near(again, guess)
+        again = self.fit(image, known, guess, photometry, missing, tight)
+        new = self.accepted(again, known, least) & missing & self._near(again, guess)
         both = fits.copy()
         both.take(again, new)
         new &= ~self.neighbours.outliers(both.pose, good | new, self._stray)
@@ -200,14 +200,14 @@ class UnitSearch:
 
     def collisions(self, fits: PoseFits, good: Mask) -> Mask:
         """Finds good units (units,) that claim one place."""
-        return self.neighbours.collisions(fits.pose, good, _CLOSE)
+        return self.neighbours.collisions(fits.pose, good, _COLLISION_DISTANCE)
 
     def _reachable(self, guess: Floats) -> Mask:
-        """Tells guesses (units, 3) that are in view, if only in part."""
-        return np.isfinite(guess[:, 0]) & self.relocaliser.in_view(guess, -_SEEN)
+        """Marks guesses (units, 3) that are in view, if only in part."""
+        return np.isfinite(guess[:, 0]) & self.relocaliser.in_view(guess, -_RIM)
 
     def _near(self, fits: PoseFits, guess: Floats) -> Mask:
-        """Tells fits (units,) that ended near where they began, and so are no other unit's."""
+        """Marks fits (units,) that ended near where they began, and so are no other unit's."""
         off = np.linalg.norm(fits.pose[:, :2] - guess[:, :2], axis=1)
         turned = np.abs(fits.pose[:, 2] - guess[:, 2])
         return np.asarray((off < self._stray) & (turned < _TURNED))
@@ -217,12 +217,12 @@ class UnitSearch:
         for _ in range(_ROUNDS):
             good &= ~self.neighbours.outliers(fits.pose, good, self._stray)
             guess = self.neighbours.predict_rigid(known.pose, fits.pose, good, ~good)
-            wanted = self._reachable(guess)
-            if not wanted.any():
+            missing = self._reachable(guess)
+            if not missing.any():
                 break
             photometry = known.photometry * gain_change(fits, known, good)
-            again = self.fit_coarse_first(image, known, guess, photometry, wanted)
-            new = self.accepted(again, known) & wanted & self._near(again, guess)
+            again = self.fit_coarse_first(image, known, guess, photometry, missing)
+            new = self.accepted(again, known) & missing & self._near(again, guess)
             if not new.any():
                 break
             fits.take(again, new)
@@ -231,9 +231,9 @@ class UnitSearch:
 
     def _retry_hidden(self, image: Picture, known: UnitStates, fits: PoseFits, good: Mask) -> Mask:
         """Tries those again that may be hidden in part: place and brightness are known."""
-        assert self.looks is not None, "the first frame is the reference"
+        assert self.appearance is not None, "the first frame is the reference"
         photometry = known.photometry * gain_change(fits, known, good)
-        tight = _TIGHT * self.looks.noise * np.abs(photometry[:, 0])
+        tight = _ROBUST_SCALE * self.appearance.noise * np.abs(photometry[:, 0])
         for _ in range(_RETRIES):
             if good.all():
                 break

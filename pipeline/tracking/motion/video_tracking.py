@@ -25,7 +25,7 @@ from pipeline.tracking.fit import (
     coarse_factor,
     learn_templates,
 )
-from pipeline.tracking.frames import BrokenOffError, Frame, within_interval
+from pipeline.tracking.frames import Frame, TruncatedVideoError, check_durations
 from pipeline.tracking.geometry import SpecimenOutlines, arm_swing, lens_variance
 from pipeline.tracking.motion import uncertainty
 from pipeline.tracking.motion.camera_motion import camera_variance, remove_camera_motion, row_times
@@ -34,7 +34,7 @@ from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.motion_modes import count_at_rest
 from pipeline.tracking.motion.time_interpolation import at_frame_times, middle_speed
 from pipeline.tracking.motion.tracker import Tracker
-from pipeline.tracking.motion.unit_looks import GOOD, HIDDEN, POOR_FIT, STRAYED
+from pipeline.tracking.motion.unit_appearance import GOOD, HIDDEN, POOR_FIT, STRAYED
 from pipeline.tracking.motion.unit_search import Shutter, UnitSearch
 from pipeline.tracking.reference_frame import (
     CameraCalibration,
@@ -45,33 +45,33 @@ from pipeline.tracking.reference_frame import (
     average_at_rest,
     calibrate_camera,
     check_outlines,
-    outlines_seen,
     recognise,
-    start_doubt,
+    start_warning,
+    visible_outlines,
 )
 from sim.core import Floats, Ints, Mask, Reals, Singles
 
 LOG = logging.getLogger(__name__)
 
-_USUAL = RecordingSetup()
-_End = BrokenOffError | KeyboardInterrupt
+_DEFAULT_SETUP = RecordingSetup()
+_End = TruncatedVideoError | KeyboardInterrupt
 _Row = tuple[float, int, Singles, Singles, NDArray[np.int8], bool, float, Reals]
-"""Time, number, poses, sigma, quality, whether it is the one before again, likeness of residuals
-within blocks, shares of accelerations that show: what is kept of a frame."""
-_OF_DOF = [0, 0, 1]
+"""Time, number, poses, sigma, quality, whether it is a duplicate, inflation of the variance by
+correlated residuals, shares of accelerations that show: what is kept of a frame."""
+_SHARE_OF_DOF = [0, 0, 1]
 """Place in these shares of that of a shift, or of a rotation."""
-_CODED = 1.8
-"""Likeness from which on a codec is at work."""
-_UNSURE = 0.25
+_CODEC_INFLATION = 1.8
+"""Inflation of the variance from which on a codec is at work."""
+_LARGEST_SIGMA = 0.25
 """Standard deviation of a pose that is not known at its frame's time, px."""
 _VAGUE = 1 / 6, 5.0
 """Standard deviation of a pose that is as good as lost, px, and over the usual: three of these are
 half a pixel."""
-_FINE = 60.0
+_FINE_PITCH = 60.0
 """Pixels from unit to unit from which on such limits are parts of the pitch: what a motion leaves
 open is a length, and a camera of twice as many pixels must not lose what one of half as many
 keeps."""
-_CHANGED = 0.005
+_CHANGED_SHARE = 0.005
 """Part of the pixels that differ in a picture that is shown again, at most."""
 
 
@@ -95,7 +95,7 @@ def track_video(
     specimen: SpecimenOutlines,
     px_per_mm: float | None = None,
     tell: Callable[[], None] | None = None,
-    setup: RecordingSetup = _USUAL,
+    setup: RecordingSetup = _DEFAULT_SETUP,
 ) -> Track:
     """Tracks the specimen; what is kept of a frame are its poses, so memory hardly grows.
 
@@ -111,7 +111,7 @@ def track_video(
             the exposure or the readout is longer than from a frame to the next.
     """
     lasting = {"exposure": setup.exposure or 0.0, "readout": abs(setup.readout)}
-    shown = average_at_rest(within_interval(frames, lasting))
+    shown = average_at_rest(check_durations(frames, lasting))
     if not shown.averaged:
         raise UserError("the video has no frame in this window", key="window", remedy="widen it")
     ways = recognise(shown.image, specimen, px_per_mm, setup)
@@ -121,60 +121,64 @@ def track_video(
     check_outlines(specimen, ways[0], calibration)
     if (seen := orientation_text(calibration.camera)) != "upright":
         LOG.warning("the specimen is %s; motions are in the design's own frame", seen)
-    places = _centre_places(shown.image, specimen, ways[0], calibration, setup.kind)
-    tracker = _tracker(shown, specimen, calibration, setup)
+    places = _measure_rest(shown.image, specimen, ways[0], calibration, setup.kind)
+    tracker = _make_tracker(shown, specimen, calibration, setup)
     rows, ended = _track_frames(shown.frames, tracker, tell)
-    times, numbers, motion, sigmas, qualities, same, likeness, shares = (
+    times, numbers, motion, sigmas, qualities, same, inflation, shares = (
         np.array(values) for values in zip(*rows, strict=True)
     )
-    exposure = setup.exposure or _exposure(tracker, motion, times)
+    exposure = setup.exposure or _refine_exposure(tracker, motion, times)
     del rows, tracker
     if setup.exposure is None and exposure:
         LOG.info("exposure, by the blur of quick motions: %.3g ms", 1000 * exposure)
     time = times - times[0]
     near = uncertainty.nearest(specimen.centre)
     rest = count_at_rest(motion[: shown.averaged, :, :2].astype(float), near)
-    missed = np.zeros_like(motion)
-    limit = max(calibration.pixel, specimen.pitch / _FINE)  # mm
+    added_variance = np.zeros_like(motion)
+    limit = max(calibration.pixel, specimen.pitch / _FINE_PITCH)  # mm
     if (setup.readout or exposure) and can_interpolate(time):
         late = row_times(motion, specimen, calibration, setup)
-        bend = exposure**2 / 24 * shares[..., _OF_DOF]
-        motion, sigmas, missed = at_frame_times(motion, sigmas, time, late, bend, near, rest)
-        _lose_unsure(motion, missed, qualities, limit)
-    _count_from_rest(motion, rest, np.nan_to_num(places.offset).astype(np.float32))
-    _add_variances(missed, motion, places, specimen, calibration, limit)
+        bend = exposure**2 / 24 * shares[..., _SHARE_OF_DOF]
+        motion, sigmas, added_variance = at_frame_times(
+            motion, sigmas, time, late, bend, near, rest
+        )
+        _discard_uncertain(motion, added_variance, qualities, limit)
+    _subtract_rest(motion, rest, np.nan_to_num(places.offset).astype(np.float32))
+    _add_variances(added_variance, motion, places, specimen, calibration, limit)
     remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     qualities[np.isnan(motion[..., 0]) & (qualities == GOOD)] = HIDDEN  # as the supports are
     faults = timing_faults(time, motion, sigmas, same)
     steady = faults != DUPLICATE
-    later = likeness[1:][np.isfinite(likeness[1:])]
-    coded = not len(later) or float(np.median(later)) > _CODED
+    later = inflation[1:][np.isfinite(inflation[1:])]
+    coded = not len(later) or float(np.median(later)) > _CODEC_INFLATION
     own = shown.averaged / (shown.averaged + 1) / rest  # a frame's noise, over that of residuals
     even = unrounded(time)
     sigma = uncertainty.calibrate_sigma(motion, sigmas, specimen.centre, steady, even, own, coded)
     if setup.follows_supports and setup.held is not None:
-        missed += camera_variance(sigma, specimen.centre, setup.held)
-    sigma = np.where(np.isfinite(motion), np.hypot(sigma, np.sqrt(missed)), np.nan)
-    vague = _vague(sigma, limit)
+        added_variance += camera_variance(sigma, specimen.centre, setup.held)
+    sigma = np.where(np.isfinite(motion), np.hypot(sigma, np.sqrt(added_variance)), np.nan)
+    vague = _are_vague(sigma, limit)
     motion[vague], sigma[vague], qualities[vague] = np.nan, np.nan, POOR_FIT
     moved = motion[..., :2].astype(float)
-    if doubt := start_doubt(moved, specimen.centre, calibration.residual, calibration.pixel):
+    if doubt := start_warning(moved, specimen.centre, calibration.residual, calibration.pixel):
         LOG.warning(doubt)
     start = float(times[0])
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended, rest)
 
 
-def _lose_unsure(motion: Reals, missed: Reals, qualities: NDArray[np.int8], length: float) -> None:
-    """Marks, in place, poses (frames, units) as lost that are not known at their frames' times.
+def _discard_uncertain(
+    motion: Reals, added_variance: Reals, qualities: NDArray[np.int8], length: float
+) -> None:
+    """Discards, in place, poses (frames, units) that are not known at their frames' times.
 
     The length, mm, is that of a pixel, or of what counts as one.
 
     Raises:
         UserError: that are all.
     """
-    off = np.sqrt(missed[..., :2].max(axis=-1)) / length
+    off = np.sqrt(added_variance[..., :2].max(axis=-1)) / length
     usual = np.median(off, axis=1, keepdims=True)  # one unit alone has met with noise
-    unsure = (off > _UNSURE) & (usual > _UNSURE / 5)
+    unsure = (off > _LARGEST_SIGMA) & (usual > _LARGEST_SIGMA / 5)
     motion[unsure], qualities[unsure] = np.nan, STRAYED
     if not np.isfinite(motion).any():
         what, remedy = "no unit has a pose in any frame", "correct exposure and readout"
@@ -189,7 +193,7 @@ def _lose_unsure(motion: Reals, missed: Reals, qualities: NDArray[np.int8], leng
 
 
 def _add_variances(
-    missed: Reals,
+    added_variance: Reals,
     motion: Reals,
     places: RestPlaces,
     specimen: SpecimenOutlines,
@@ -198,9 +202,9 @@ def _add_variances(
 ) -> None:
     """Adds variances of motions by those of rest places and camera; warns of too large ones."""
     camera, limit, far = calibration.camera, (_VAGUE[0] * length) ** 2, 0
-    for frames, bent in lens_variance(camera, calibration.alike, specimen.centre, motion):
+    for frames, bent in lens_variance(camera, calibration.sigma_points, specimen.centre, motion):
         far += int((bent[..., :2].max(axis=-1) > limit).sum())
-        missed[frames] += places.swing_variance(motion[frames, :, 2]) + bent
+        added_variance[frames] += places.swing_variance(motion[frames, :, 2]) + bent
     if far:
         LOG.warning(
             "%.2g %% of the poses are lost, as they lie where the specimen at rest does not tell"
@@ -209,15 +213,15 @@ def _add_variances(
         )
 
 
-def _vague(sigma: Reals, length: float) -> Mask:
-    """Marks poses (frames, units) of which next to nothing is known, beside the others."""
+def _are_vague(sigma: Reals, length: float) -> Mask:
+    """Marks poses (frames, units) far more uncertain than the others."""
     place = sigma[..., :2].max(axis=-1) / length
     known = np.isfinite(place)
     least, times = _VAGUE
     return known & (place > max(least, times * float(np.median(place[known]))))
 
 
-def _exposure(tracker: Tracker, motion: Reals, times: Floats) -> float:
+def _refine_exposure(tracker: Tracker, motion: Reals, times: Floats) -> float:
     """Returns the exposure that blurs as was seen, by speeds that later frames tell as well."""
     found = []
     for blur in tracker.exposure.blurs:
@@ -228,7 +232,7 @@ def _exposure(tracker: Tracker, motion: Reals, times: Floats) -> float:
     return float(np.nanmedian(found)) if np.isfinite(found).any() else tracker.exposure.time
 
 
-def _count_from_rest(motion: Reals, count: int, offset: Singles) -> None:
+def _subtract_rest(motion: Reals, count: int, offset: Singles) -> None:
     """Counts motions (frames, units, 3), in place, from the mean of the first frames on.
 
     What the middles swing about the design's places, offset (units, 2), is added.
@@ -239,7 +243,7 @@ def _count_from_rest(motion: Reals, count: int, offset: Singles) -> None:
     motion[..., :2] += arm_swing(motion[..., 2], offset)
 
 
-def _centre_places(
+def _measure_rest(
     image: Picture,
     specimen: SpecimenOutlines,
     detection: LatticeDetection,
@@ -272,13 +276,13 @@ def _track_frames(
             fits, quality = tracker.step(frame.image, frame.time)
             sigma = uncertainty.standard_errors(fits.scatter, fits.blocks).astype(np.float32)
             pose = fits.pose.astype(np.float32)
-            same = before is not None and _same(before, frame.image)
-            before, like = frame.image, uncertainty.residual_likeness(fits)
+            same = before is not None and _is_duplicate(before, frame.image)
+            before, like = frame.image, uncertainty.variance_inflation(fits)
             kept = pose, sigma, quality.astype(np.int8), same, like, tracker.bend_share
             rows.append((frame.time, frame.index, *kept))
             if tell is not None:
                 tell()
-    except (BrokenOffError, KeyboardInterrupt) as error:
+    except (TruncatedVideoError, KeyboardInterrupt) as error:
         if not rows:
             raise
         return rows, error
@@ -286,7 +290,7 @@ def _track_frames(
 
 
 def can_interpolate(time: Floats) -> bool:
-    """Tells whether times (frames,), s, ascend, as between frames; warns where they do not."""
+    """Tests whether times (frames,), s, ascend, as between frames; warns where they do not."""
     ascends = bool((np.diff(time) > 0.0).all())
     if not ascends:
         LOG.warning(
@@ -296,12 +300,15 @@ def can_interpolate(time: Floats) -> bool:
     return ascends
 
 
-def _same(before: Picture, image: Picture) -> bool:
-    """Tells a picture that is shown again: a codec changes a few pixels by a level."""
-    return cv2.countNonZero((cv2.absdiff(before, image) > 1).view(np.uint8)) < _CHANGED * image.size
+def _is_duplicate(before: Picture, image: Picture) -> bool:
+    """Detects a picture that is shown again: a codec changes a few pixels by a level."""
+    return (
+        cv2.countNonZero((cv2.absdiff(before, image) > 1).view(np.uint8))
+        < _CHANGED_SHARE * image.size
+    )
 
 
-def _tracker(
+def _make_tracker(
     shown: StillFrames,
     specimen: SpecimenOutlines,
     calibration: CameraCalibration,
@@ -323,7 +330,7 @@ def _tracker(
     relocaliser = Relocaliser(specimen, camera, calibration.bright)
     shutter = Shutter(setup.exposure, setup.readout, noise)
     fitter, slopes = PoseFitter(camera, templates), LightSlopes(specimen.count, shown.averaged)
-    seen = outlines_seen(calibration.outlines)
+    seen = visible_outlines(calibration.outlines)
     factor, coarse = coarse_factor(specimen, camera), None
     if factor > 1:
         told = calibration.blur, setup.kind

@@ -1,4 +1,4 @@
-"""Converts points with displacements, as DIC systems export them, to motions of the units."""
+"""Converts displacements of points, as DIC systems export them, to motions of the units."""
 
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
@@ -22,9 +22,9 @@ from pipeline.tracking.output.subset_overlap import Residuals, inflate_sigma, su
 from pipeline.tracking.output.track_dataset import label_track, pose_variables
 from sim.core import Floats, Ints, Mask
 
-_FINEST = 1e-4  # mm, standard deviation of the best points
-_LEAST = 3  # points of a unit
-_MOST_LOOKS = 200  # of a unit at a time, that tell how far subsets overlap
+_LEAST_SIGMA = 1e-4  # mm, standard deviation of the best points
+_FEWEST = 3  # points of a unit
+_MOST_SAMPLES = 200  # of a unit at a time, that tell how far subsets overlap
 
 ColumnName = Annotated[str, Field(min_length=1)]
 
@@ -82,12 +82,12 @@ class DicPoints(NamedTuple):
     Attributes:
         time: (rows,) s.
         place: (rows, 2) at rest, mm.
-        moved: (rows, 2) displacement, mm.
+        displacement: (rows, 2) displacement, mm.
     """
 
     time: Floats
     place: Floats
-    moved: Floats
+    displacement: Floats
 
 
 def load(path: Path) -> DicExport:
@@ -99,19 +99,19 @@ def load(path: Path) -> DicExport:
     return load_section(path, DicExport)
 
 
-def read_points(path: Path, asked: DicExport) -> DicPoints:
+def read_points(path: Path, export: DicExport) -> DicPoints:
     """Reads the points of a file in the specimen's frame.
 
     Raises:
         UserError: the file cannot be read, or lacks a column.
     """
-    names = asked.columns
+    names = export.columns
     columns = (names.time, names.x, names.y, names.ux, names.uy)
     dimensions = (units.TIME, *[units.LENGTH] * 4)
     table = csv_columns.read_columns(path, columns, dimensions)
-    upright = np.array([1.0, -1.0 if asked.flipped else 1.0])
-    turn = rotation_matrix(asked.rotation)
-    place = (table[:, 1:3] - np.array(asked.origin)) * upright @ turn
+    upright = np.array([1.0, -1.0 if export.flipped else 1.0])
+    turn = rotation_matrix(export.rotation)
+    place = (table[:, 1:3] - np.array(export.origin)) * upright @ turn
     return DicPoints(table[:, 0], place, table[:, 3:5] * upright @ turn)
 
 
@@ -130,19 +130,19 @@ def track(design: xr.Dataset, seen: DicPoints, subset: float | None = None) -> x
         UserError: hardly a unit bears points enough to tell its motion.
     """
     specimen = outlines_of_design(design)
-    unit = _bearer(specimen, seen.place)
+    unit = _containing_unit(specimen, seen.place)
     time, frame = np.unique(seen.time, return_inverse=True)
-    groups = _grouped(frame * specimen.count + unit, unit >= 0)
+    groups = _group_rows(frame * specimen.count + unit, unit >= 0)
     bearing = len({int(unit[rows[0]]) for rows in groups})
     if bearing < max(3, specimen.count // 10):
         low, high = seen.place.min(axis=0), seen.place.max(axis=0)
         raise UserError(
-            f"{bearing} of {specimen.count} units bear points enough, {_LEAST} or more at a time;"
+            f"{bearing} of {specimen.count} units bear points enough, {_FEWEST} or more at a time;"
             f" all reach from ({low[0]:.1f}, {low[1]:.1f}) to ({high[0]:.1f}, {high[1]:.1f}) mm"
             " of the specimen",
             key="origin",
             remedy="give origin, rotation and flipped so that the points lie on the units,"
-            f" and export {_LEAST} or more on each",
+            f" and export {_FEWEST} or more on each",
         )
     motion = np.full((len(time), specimen.count, 3), np.nan)
     sigma = np.full_like(motion, np.nan)
@@ -150,14 +150,14 @@ def track(design: xr.Dataset, seen: DicPoints, subset: float | None = None) -> x
         ((frame[rows[0]], unit[rows[0]]), seen.place[rows] - specimen.centre[unit[rows[0]]], rows)
         for rows in groups
     ]
-    looks, step = [], -(-len(fits) // _MOST_LOOKS)
+    samples, step = [], -(-len(fits) // _MOST_SAMPLES)
     for number, (at, before, rows) in enumerate(fits):
-        motion[at], sigma[at], rest = _fitted(before, before + seen.moved[rows])
+        motion[at], sigma[at], rest = _fit_pose(before, before + seen.displacement[rows])
         if number % step == 0:
-            looks.append(Residuals(before, rest))
+            samples.append(Residuals(before, rest))
     if subset is None:
         widest = max(np.ptp(specimen.polygon(k), axis=0).max() for k in range(specimen.count))
-        subset = subset_width(looks, float(widest))
+        subset = subset_width(samples, float(widest))
     factors: dict[bytes, Floats] = {}  # points mostly stay where they are
     for at, before, _ in fits:
         if (place := before.tobytes()) not in factors:
@@ -166,16 +166,16 @@ def track(design: xr.Dataset, seen: DicPoints, subset: float | None = None) -> x
     return _dataset(design, time - time[0], motion, sigma)
 
 
-def _grouped(key: Ints, wanted: Mask) -> list[Ints]:
-    """Groups the wanted rows by their key, where these are enough to tell a pose."""
+def _group_rows(key: Ints, on_unit: Mask) -> list[Ints]:
+    """Groups rows on units by their key, where there are enough for a pose."""
     order = np.argsort(key, kind="stable")
-    order = order[wanted[order]]
+    order = order[on_unit[order]]
     groups = np.split(order, np.flatnonzero(np.diff(key[order])) + 1)
-    return [rows for rows in groups if len(rows) >= _LEAST]
+    return [rows for rows in groups if len(rows) >= _FEWEST]
 
 
-def _bearer(specimen: SpecimenOutlines, place: Floats) -> Ints:
-    """Finds the unit (rows,) on which each point lies at rest, -1 for none."""
+def _containing_unit(specimen: SpecimenOutlines, place: Floats) -> Ints:
+    """Finds the unit (rows,) that contains each point at rest, -1 for none."""
     faces = [
         shapely.Polygon(specimen.centre[unit] + specimen.polygon(unit))
         for unit in range(specimen.count)
@@ -186,18 +186,18 @@ def _bearer(specimen: SpecimenOutlines, place: Floats) -> Ints:
     return out
 
 
-def _fitted(before: Floats, after: Floats) -> tuple[Floats, Floats, Floats]:
+def _fit_pose(before: Floats, after: Floats) -> tuple[Floats, Floats, Floats]:
     """Fits pose and standard uncertainty (3,) to points relative to the centroid at rest.
 
     Also returns what is left of each point's motion (n, 2).
     """
-    turn, shift, weight = robust_motion(before, after, _FINEST)
+    turn, shift, weight = robust_motion(before, after, _LEAST_SIGMA)
     rest = after - before @ rotation_matrix(-turn) - shift
     count = weight.sum()
     middle = weight @ before / count
     arm = weight @ ((before - middle) ** 2).sum(axis=1)
     freedom = max(2 * count - 3, 1.0)
-    variance = max(float(weight @ (rest**2).sum(axis=1)) / freedom, _FINEST**2)
+    variance = max(float(weight @ (rest**2).sum(axis=1)) / freedom, _LEAST_SIGMA**2)
     lever = middle[::-1] ** 2  # the centroid lies aside from the middle of the points
     place = variance * (1 / count + lever / arm)
     return np.array([*shift, turn]), np.sqrt([*place, variance / arm]), rest

@@ -171,12 +171,12 @@ def write_track_table(track: xr.Dataset, path: Path) -> None:
             file.write(f"# {SYNTHETIC_LABEL}: of a rendered video\n")
         file.write(_HEADING + "\n")
         for frame, time in enumerate(track["time"].values):
-            load = _cells(loads[frame])
+            load = _table_cells(loads[frame])
             numbers = np.concatenate([pose[frame], sigma[frame]], axis=-1)
             for unit in there:
                 told = f"{load},{names[int(quality[frame, unit])]}"
-                file.write(f"{time:.9g},{labels[unit]},{_cells(numbers[unit])},{told}\n")
+                file.write(f"{time:.9g},{labels[unit]},{_table_cells(numbers[unit])},{told}\n")
 
 
-def _cells(values: Floats) -> str:
+def _table_cells(values: Floats) -> str:
     return ",".join("" if np.isnan(value) else f"{value:.7g}" for value in values)

@@ -4,9 +4,9 @@ from .camera_calibration import RecordingSetup as RecordingSetup
 from .camera_calibration import calibrate_camera as calibrate_camera
 from .recognition import ambiguity_text as ambiguity_text
 from .recognition import check_outlines as check_outlines
-from .recognition import outlines_seen as outlines_seen
 from .recognition import recognise as recognise
+from .recognition import visible_outlines as visible_outlines
 from .rest_places import RestPlaces as RestPlaces
 from .still_frames import StillFrames as StillFrames
 from .still_frames import average_at_rest as average_at_rest
-from .still_frames import start_doubt as start_doubt
+from .still_frames import start_warning as start_warning

@@ -1,4 +1,4 @@
-"""Proposes a recording by a first look at a video: units, markings, and what it does not tell."""
+"""Proposes a recording by the first frame of a video: units, markings, and warnings."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -26,8 +26,8 @@ from pipeline.tracking.reference_frame.recognition import (
 )
 from sim.core import Floats, Image
 
-_CLEARLY = 0.03  # of the units, by which one structure must be better matched than another
-_GOOD, _MISSING = (60, 140, 20), (0, 123, 224)  # blue, green, red
+_LEAST_MARGIN = 0.03  # of the units, by which one structure must be better matched than another
+_FOUND, _MISSING = (60, 140, 20), (0, 123, 224)  # blue, green, red
 
 
 class Proposal(NamedTuple):
@@ -38,11 +38,11 @@ class Proposal(NamedTuple):
     detection: LatticeDetection  # where they are
     kind: str  # dots, speckle or bare
     pixel_size: float  # mm
-    doubts: tuple[str, ...]  # what could not be told, in words
+    warnings: tuple[str, ...]  # what the frame leaves open, in words
 
 
 def propose(image: Picture, design: xr.Dataset, px_per_mm: float | None = None) -> Proposal:
-    """Looks for every structure of the design in a frame.
+    """Recognises every structure of the design in a frame; proposes the best.
 
     Raises:
         UserError: none is there.
@@ -57,14 +57,18 @@ def propose(image: Picture, design: xr.Dataset, px_per_mm: float | None = None) 
             refused.append(error)
     if not seen:
         raise refused[0]
-    best = max(seen, key=_share)
+    best = max(seen, key=_agreement)
     specimen, calibration = best.specimen, best.calibration
     detection = replace(best.ways[0], camera=calibration.camera)
     check_outlines(specimen, detection, calibration)
-    like = [one.name for one in seen if one != best and _share(one) > _share(best) - _CLEARLY]
+    similar = [
+        one.name
+        for one in seen
+        if one != best and _agreement(one) > _agreement(best) - _LEAST_MARGIN
+    ]
     kind = classify_markings(image, specimen, detection, 1 / calibration.pixel)
-    doubts = tuple(_doubts(best, like))
-    return Proposal(best.name, specimen, detection, kind, calibration.pixel, doubts)
+    warnings = tuple(_warnings(best, similar))
+    return Proposal(best.name, specimen, detection, kind, calibration.pixel, warnings)
 
 
 class _Candidate(NamedTuple):
@@ -95,26 +99,26 @@ def _structures(design: xr.Dataset) -> Iterator[tuple[str, SpecimenOutlines]]:
             yield name, specimen
 
 
-def _share(one: _Candidate) -> float:
-    """Returns the part of the units that agree with this structure, less what it does not have."""
+def _agreement(one: _Candidate) -> float:
+    """Computes the share of units that agree with a structure, less that of surplus patches."""
     there = units_in_frame(one.specimen, one.calibration)
     fitting = agreeing_outlines(one.specimen, one.calibration.outlines) & there
     return float(fitting.sum() / max(there.sum(), 1)) - one.surplus / one.specimen.count
 
 
-def _doubts(best: _Candidate, like: list[str]) -> Iterator[str]:
-    if like:
-        yield f"structure: as many units fit {' and '.join(like)}; say which was built"
+def _warnings(best: _Candidate, similar: list[str]) -> Iterator[str]:
+    if similar:
+        yield f"structure: as many units fit {' and '.join(similar)}; say which was built"
     if more := best.surplus:
         yield f"{more} patches of a unit's size that this structure does not have"
-    gone = units_out_of_frame(best.specimen, best.calibration)
-    if outside := int(gone.sum()):
-        yield f"{outside} units lie outside the first frame and are not tracked: film all of them"
-    if missing := int((~gone).sum()) - int((~gone)[best.ways[0].unit].sum()):
+    outside = units_out_of_frame(best.specimen, best.calibration)
+    if count := int(outside.sum()):
+        yield f"{count} units lie outside the first frame and are not tracked: film all of them"
+    if missing := int((~outside).sum()) - int((~outside)[best.ways[0].unit].sum()):
         yield f"{missing} units were not found at first sight (orange in the picture); tracking"
         yield "  looks for them again"
-    if doubt := ambiguity_text(best.ways):
-        yield f"turned, mirrored: {doubt}"
+    if warning := ambiguity_text(best.ways):
+        yield f"turned, mirrored: {warning}"
     yield "window: whether the specimen is at rest in the first frame"
     yield "readout: a phone's rows are read in 10 ms to 30 ms; untold, units seem to move where the"
     yield "  camera does"
@@ -136,21 +140,23 @@ def draw_proposal(image: Picture, found: Proposal, note: str = "") -> Image:
     drawn = cv2.cvtColor(drawn, cv2.COLOR_GRAY2BGR)
     seen = np.isin(np.arange(found.specimen.count), found.detection.unit)
     for unit, number in enumerate(found.specimen.ids):
-        colour = _GOOD if seen[unit] else _MISSING
+        colour = _FOUND if seen[unit] else _MISSING
         corners = found.specimen.centre[unit] + found.specimen.polygon(unit)
-        outline = _at(found.detection.camera.project(corners), scale)
+        outline = _to_drawing(found.detection.camera.project(corners), scale)
         cv2.polylines(drawn, [outline], True, colour, 2, cv2.LINE_AA)
-        x, y = _at(found.detection.camera.project(found.specimen.centre[unit]), scale).tolist()
-        _centred(drawn, str(number), (x, y), colour)
-    _centred(drawn, note, (60, 16), _MISSING)
+        x, y = _to_drawing(
+            found.detection.camera.project(found.specimen.centre[unit]), scale
+        ).tolist()
+        _draw_text(drawn, str(number), (x, y), colour)
+    _draw_text(drawn, note, (60, 16), _MISSING)
     return np.asarray(drawn, np.uint8)
 
 
-def _at(pixels: Floats, scale: int) -> np.ndarray:
+def _to_drawing(pixels: Floats, scale: int) -> np.ndarray:
     return np.round((pixels + 0.5) * scale - 0.5).astype(np.int32)
 
 
-def _centred(image: np.ndarray, text: str, at: tuple[int, int], colour: tuple[int, ...]) -> None:
+def _draw_text(image: np.ndarray, text: str, at: tuple[int, int], colour: tuple[int, ...]) -> None:
     (wide, high), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.4, 1)
     origin = (at[0] - wide // 2, at[1] + high // 2)
     for ink, width in (((255, 255, 255), 3), (colour, 1)):

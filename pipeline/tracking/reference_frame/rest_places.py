@@ -60,7 +60,7 @@ def estimate_rest_places(outlines: PoseFits) -> RestPlaces:
     usual = float(np.median(white))
     error = white + white**2 / usual
     well = white <= usual
-    made = _variance_made(along[well], error[well])
+    made = _manufacturing_variance(along[well], error[well])
     share = made / (made + error)
     places.offset[seen] = np.einsum("uia,ua->ui", axes, share * along)
     places.covariance[~seen] = made * np.eye(2)
@@ -68,7 +68,7 @@ def estimate_rest_places(outlines: PoseFits) -> RestPlaces:
     return places
 
 
-def _variance_made(offset: Floats, error: Floats) -> float:
+def _manufacturing_variance(offset: Floats, error: Floats) -> float:
     """Finds the variance of offsets (n,) beyond that of their errors, by the median."""
 
     def excess(variance: float) -> float:

@@ -14,7 +14,7 @@ from pipeline.calibration import numbered_pictures
 from pipeline.calibration.inputs import KnownPictures
 from pipeline.runtime import UserError
 from pipeline.tracking.frames import read_picture
-from pipeline.tracking.motion import moved_outline
+from pipeline.tracking.motion import transform_outline
 from reports.base import style
 from reports.page import PageTable
 from sim.core import Floats, Image
@@ -66,7 +66,7 @@ def draw_pictures(made: xr.Dataset, asked: KnownPictures, folder: Path) -> Figur
         for part, outline in enumerate(outlines):
             motion = np.zeros(3) if k == 0 else made["measured"].values[part, at[k - 1]]
             centre = np.array(parts.parts[part].centre)
-            corners = moved_outline(outline, centre, motion)
+            corners = transform_outline(outline, centre, motion)
             for colour, width in (("white", 2.0), (style.INTACT if k == 0 else style.CLOAKED, 1.0)):
                 axes.fill(*corners.T, facecolor="none", edgecolor=colour, linewidth=width)
     for k, name in enumerate(("to the right", "down", "rotation")):

@@ -50,7 +50,7 @@ def asked(tmp_path: Path) -> TrackedMotion:
 def test_every_stiffness_has_its_own_factor(asked: TrackedMotion, tmp_path: Path) -> None:
     """Computes and predicts the motion that the study itself has at its nominal constants."""
     made = pose_specimen(asked, tmp_path)
-    assert made.stiffer[:2] == pytest.approx(np.array([[1.0, 1.0, 1.0], [1.0, 3.0, 2.0]]))
+    assert made.stiffness_factors[:2] == pytest.approx(np.array([[1.0, 1.0, 1.0], [1.0, 3.0, 2.0]]))
     problem = load(tmp_path / "problem.yaml")
     scene, nominal = scene_of(problem, tmp_path), Constants(problem.material, None, 15.0)
     track = simulate_track(asked, tmp_path, nominal, np.random.default_rng(0))

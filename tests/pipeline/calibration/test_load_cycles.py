@@ -344,9 +344,9 @@ def test_jumps_leave_a_turning_path(morpher: LoadCycles, monkeypatch: pytest.Mon
     found = follow_cycle(morpher, morpher.records[1], FOLDER)
     ((fixed, values, drive, path),) = made
     first, second, third, fourth = path.turns
-    assert (path.falling[first + 1 : second] == 1).all()
-    assert not path.falling[second + 1 : third].any()
-    assert (path.falling[third + 1 : fourth] == 1).all()
+    assert (path.n_negative[first + 1 : second] == 1).all()
+    assert not path.n_negative[second + 1 : third].any()
+    assert (path.n_negative[third + 1 : fourth] == 1).all()
     assert (np.diff(found.traced[first : second + 1, 0]) < 0).all()
     assert (np.diff(found.traced[third : fourth + 1, 0]) < 0).all()
     near, far = path.loads[1:first], 240 - path.loads[fourth + 1 :][::-1]

@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.calibration import study_pictures
 from pipeline.calibration.inputs import KnownPictures
-from pipeline.calibration.picture_study import moved_parts
+from pipeline.calibration.picture_study import tracked_parts
 from pipeline.problem.reading import load_section
 from pipeline.runtime import ROOT, UserError
 from pipeline.tracking.motion import find_motion, fit_motion
@@ -28,21 +28,21 @@ def test_parts_move_as_another_program_has_them_and_the_specimen_is_found() -> N
 
 @pytest.mark.slow
 def test_pixels_at_the_edge_tell_of_the_rotation_of_a_small_part() -> None:
-    lever = [each for each in moved_parts(ASKED.rigid_parts, FOLDER) if each.part == 1][:4]
+    lever = [each for each in tracked_parts(ASKED.rigid_parts, FOLDER) if each.part == 1][:4]
 
     def turned(*, whole: bool) -> float:
         error = []
         for each in lever:
             start = find_motion(each.patch)
             assert start is not None
-            error.append(fit_motion(each.patch, start, whole=whole)[2] - each.reference[2])
+            error.append(fit_motion(each.patch, start, include_edge=whole)[2] - each.reference[2])
         return float(np.sqrt(np.mean(np.square(error))))
 
     assert turned(whole=True) < 0.5 * turned(whole=False)
 
 
 def test_a_patch_without_features_is_not_found() -> None:
-    patch = next(moved_parts(ASKED.rigid_parts, FOLDER)).patch
+    patch = next(tracked_parts(ASKED.rigid_parts, FOLDER)).patch
     assert find_motion(patch._replace(after=np.zeros_like(patch.after))) is None
 
 
@@ -54,5 +54,5 @@ def test_a_line_about_no_picture_is_refused(tmp_path: Path) -> None:
     table.write_text(",".join(parts.columns) + "\n4875,0,1,1,0\n4999,0,1,1,0\n")
     posed = parts.model_copy(update={"folder": "."})
     with pytest.raises(UserError, match="4999, 0") as caught:
-        list(moved_parts(posed, tmp_path))
+        list(tracked_parts(posed, tmp_path))
     assert caught.value.file == str(table)

@@ -90,7 +90,7 @@ def test_emulated_curves(asked: Population, centre: Constants, emulator: CurveEm
         return jnp.exp(curve_emulator.log_force(weights, emulator.centre, base, place)).sum()
 
     np.testing.assert_allclose(total(jnp.asarray(logs)), posed.predict(constants).sum(), rtol=5e-4)
-    by_adjoint = posed.pulled_back(constants, np.ones(3))[:3] * np.exp(logs)
+    by_adjoint = posed.pull_back(constants, np.ones(3))[:3] * np.exp(logs)
     np.testing.assert_allclose(jax.grad(total)(jnp.asarray(logs)), by_adjoint, atol=2e-3)
 
 
@@ -281,5 +281,5 @@ def test_the_stored_constants_name_the_files_that_they_were_drawn_from(
 
 def test_a_curve_that_others_simulated_ends_where_it_does() -> None:
     curve = np.array([[1.0, 10.0], [2.0, 30.0]])
-    found = validation_study.within(np.array([0.9, 1.0, 1.5, 2.0, 2.1]), curve)
+    found = validation_study.interpolate_curve(np.array([0.9, 1.0, 1.5, 2.0, 2.1]), curve)
     np.testing.assert_array_equal(found, [np.nan, 10.0, 20.0, 30.0, np.nan])

@@ -34,7 +34,7 @@ def test_a_long_high_speed_film_is_aligned_by_all_its_frames(start: float) -> No
     assert axis.lag.value == pytest.approx(start, abs=0.01 / RATE)
     assert not axis.lag.ambiguous
     kept = select_frames(axis.time, 1 / FREQUENCY)
-    np.testing.assert_allclose(axis.taken(kept).time, np.arange(0.0, END, 1 / RATE), atol=1 / RATE)
+    np.testing.assert_allclose(axis.select(kept).time, np.arange(0.0, END, 1 / RATE), atol=1 / RATE)
 
 
 def test_many_frames_are_thinned_but_not_below_what_a_period_takes() -> None:

@@ -59,7 +59,7 @@ def test_gaps_are_left_out_and_nothing_at_all_gives_no_number() -> None:
     np.testing.assert_allclose(found[:SHIFT], compute_metrics(whole)[:SHIFT], rtol=0.05)
     empty = compute_metrics(whole._replace(measured=np.full_like(whole.measured, np.nan)))
     assert np.isnan(empty).all()
-    none = whole.taken(np.arange(FRAMES), np.arange(0))
+    none = whole.resample(np.arange(FRAMES), np.arange(0))
     assert np.isnan(estimate_metrics(none, None, np.random.default_rng(0))).all()
     assert np.isnan(estimate_metrics(pair(0.01), None, np.random.default_rng(0))[:, SHIFT]).all()
 
@@ -70,7 +70,7 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
     held = 0
     for seed in range(40):
         random = np.random.default_rng(seed)
-        seen = pair(0.02, seed=seed).taken(np.arange(15), np.arange(UNITS))
+        seen = pair(0.02, seed=seed).resample(np.arange(15), np.arange(UNITS))
         off = random.normal(0, 0.1, (1, UNITS, 3))
         _, low, high = bootstrap(
             seen._replace(measured=seen.measured + off), compute_metrics, random

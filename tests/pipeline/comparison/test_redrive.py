@@ -9,7 +9,7 @@ from pipeline.comparison.redrive import filter_held_motion, fit_spline, simulate
 from pipeline.posing import PosedStructure, scene_of
 from pipeline.runtime import UserError
 from sim.scene import Scene, concrete_parameters, make_plan
-from sim.solvers import LinearRamp, PrescribedMotion, Together, solve_case
+from sim.solvers import LinearRamp, PrescribedMotion, Superposition, solve_case
 from tests.pipeline import static
 
 SIGMA = np.array([0.004, 0.004, 0.0006])
@@ -66,7 +66,7 @@ def test_the_force_of_two_sides_that_were_pressed_is_the_first_ones(pressed: Sce
     right = pressed.loads.driven
     left = np.unique(pressed.loads.clamped // 3)
     ways = LinearRamp(2.0, 1.0, np.pi), LinearRamp(2.0, 1.0)
-    both = Together(ways, np.repeat(np.eye(2), 5, axis=0))
+    both = Superposition(ways, np.repeat(np.eye(2), 5, axis=0))
     drive = PrescribedMotion(np.concatenate([right, left]), both)
     scene = pressed.updated(cases=(drive,), supports=(), reference=None)
     track, _ = tracked(scene, 1.0, 12)

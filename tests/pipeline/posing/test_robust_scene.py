@@ -112,7 +112,7 @@ def test_gains_of_a_robust_study_are_over_copies_that_it_does_not_know(
         counted.append(0 if scene.design.copies is None else len(scene.design.copies))
         return 1.0
 
-    monkeypatch.setattr(robust_gains, "_over_copies", counting)
+    monkeypatch.setattr(robust_gains, "_mean_loss", counting)
     more = "presets: { worst: { objective: { robust: { copy_sharpness: 8 } } } }\n"
     held = HOLE.replace("target: intact", "target: intact, robust: { copies: 2 }")
     path = write(tmp_path, held + more, size=5, amplitude=3.0)

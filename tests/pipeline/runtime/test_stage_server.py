@@ -190,11 +190,11 @@ def test_a_stage_that_does_not_end_with_its_workflow_is_killed(
         listener.bind("")
         listener.listen()
         server = stage_server._Server(listener, life, ended)
-        server._watch(stage_server._Job(process, ours))
+        server._add_job(stage_server._Job(process, ours))
         os.close(held)
         assert server.serve() is None
     killed = (-signal.SIGKILL).to_bytes(2, signed=True)
-    assert client.recv(3) == stage_server._TAKEN_UP + killed
+    assert client.recv(3) == stage_server._ACCEPTED + killed
     client.close()
     os.close(life)
     os.close(ended)
@@ -226,13 +226,13 @@ def test_a_stage_may_end_as_its_client_is_signalled() -> None:
     ours, client = socket.socketpair()
     if not (process := os.fork()):
         os._exit(3)
-    server._watch(stage_server._Job(process, ours))
+    server._add_job(stage_server._Job(process, ours))
     os.waitid(os.P_PID, process, os.WEXITED | os.WNOWAIT)
     os.write(wake, bytes([signal.SIGCHLD]))
     client.sendall(bytes([signal.SIGTERM]))
     os.close(held)
     assert server.serve() is None
-    assert client.recv(3) == stage_server._TAKEN_UP + (3).to_bytes(2)
+    assert client.recv(3) == stage_server._ACCEPTED + (3).to_bytes(2)
     for descriptor in (life, ended, wake):
         os.close(descriptor)
     client.close()
@@ -271,9 +271,9 @@ def test_a_stage_ends_with_a_client_that_has_read_nothing() -> None:
         if not (process := os.fork()):
             signal.pause()
         ours, client = socket.socketpair()
-        server._watch(job := stage_server._Job(process, ours))
+        server._add_job(job := stage_server._Job(process, ours))
         client.close()
-        server._hand_on(job)
+        server._forward(job)
         assert os.waitpid(process, 0)[1] == signal.SIGKILL
         ours.close()
     os.close(life)

@@ -31,8 +31,8 @@ def reconsidered(study: Path, out: Path, factor: float) -> tuple[xr.Dataset, xr.
     options = ["--problem", str(study / "problem.yaml"), "--quiet", "--out"]
     first = ["--design", str(study / "design.nc"), "--response", str(told)]
     assert run_stage("redesign", [*options, str(second), *first]) == 0
-    again = [*options, str(moved), "--design", str(second), "--geometric"]
-    assert run_stage("simulate", again) == 0
+    with_distance_contact = [*options, str(moved), "--design", str(second), "--geometric"]
+    assert run_stage("simulate", with_distance_contact) == 0
     return datasets.read(second, "design"), datasets.read(moved, "response")
 
 

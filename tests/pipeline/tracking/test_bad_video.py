@@ -17,18 +17,18 @@ from pipeline.runtime import UserError
 from pipeline.stages.track import readout_of
 from pipeline.tracking.detect import orientation_text
 from pipeline.tracking.frames import (
-    BrokenOffError,
     Frame,
     Recording,
+    TruncatedVideoError,
+    check_durations,
     import_video,
     read_frames,
     read_pictures,
     video_length,
-    within_interval,
 )
 from pipeline.tracking.geometry import outlines_of_design
 from pipeline.tracking.motion import Track, track_video, video_tracking
-from pipeline.tracking.motion.unit_looks import GLARE, HIDDEN, OUT_OF_FRAME
+from pipeline.tracking.motion.unit_appearance import GLARE, HIDDEN, OUT_OF_FRAME
 from pipeline.tracking.reference_frame import RecordingSetup
 from tests.pipeline.tracking.conftest import CLIPS
 from tests.pipeline.virtual_lab.conftest import GRID, film_of
@@ -70,7 +70,7 @@ def test_what_lasts_longer_than_an_interval_is_refused(
 def test_what_lasts_too_long_is_told_before_all_is_tracked(clip: list[np.ndarray]) -> None:
     endless = (Frame(index, index / 300, clip[0]) for index in count())
     with refused("longer than the interval", "exposure"):
-        list(within_interval(endless, {"exposure": 0.05}))
+        list(check_durations(endless, {"exposure": 0.05}))
     assert next(endless).index < 100
 
 
@@ -214,10 +214,10 @@ def test_faulty_folders_of_pictures_are_told(tmp_path: Path, clip: list[np.ndarr
         list(read_frames(tmp_path))
     shown = read_frames(tmp_path, rate=1.0)
     next(shown)
-    with pytest.raises(BrokenOffError, match="changes its size"):
+    with pytest.raises(TruncatedVideoError, match="changes its size"):
         next(shown)
     (tmp_path / "a2.png").write_bytes(b"nothing")
-    with pytest.raises(BrokenOffError, match=r"a2\.png cannot be read"):
+    with pytest.raises(TruncatedVideoError, match=r"a2\.png cannot be read"):
         list(read_frames(tmp_path, rate=1.0))
 
 
@@ -307,7 +307,7 @@ def test_a_file_that_breaks_off_is_read_as_far_as_it_goes(tmp_path: Path) -> Non
     broken = tmp_path / "broken.mkv"
     broken.write_bytes(whole[: len(whole) * 2 // 3])
     read: list[Frame] = []
-    with pytest.raises(BrokenOffError, match="which are tracked") as caught:
+    with pytest.raises(TruncatedVideoError, match="which are tracked") as caught:
         read.extend(read_frames(broken))
     assert 0 < len(read) < 6
     end = float(str(caught.value.remedy).split("end: ")[1].split(" s")[0])
@@ -321,9 +321,9 @@ def test_a_clip_of_a_few_frames_is_whole(tmp_path: Path) -> None:
     assert len(list(read_frames(film))) == 4
 
 
-@pytest.mark.parametrize("error", [BrokenOffError("it breaks off"), KeyboardInterrupt()])
+@pytest.mark.parametrize("error", [TruncatedVideoError("it breaks off"), KeyboardInterrupt()])
 def test_what_was_tracked_before_an_end_is_kept(
-    clip: list[np.ndarray], error: BrokenOffError | KeyboardInterrupt
+    clip: list[np.ndarray], error: TruncatedVideoError | KeyboardInterrupt
 ) -> None:
     def shown() -> Iterator[Frame]:
         yield from timed(clip[:2])

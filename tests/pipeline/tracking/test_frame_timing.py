@@ -60,7 +60,7 @@ def test_a_picture_is_the_same_but_for_a_codec() -> None:
     for differing, by, same in ((10_000, 1, True), (49, 2, True), (50, 2, False)):
         image = before.copy()
         image.flat[:differing] += by
-        assert video_tracking._same(before, image) == same
+        assert video_tracking._is_duplicate(before, image) == same
 
 
 def test_frames_shown_again_are_found() -> None:

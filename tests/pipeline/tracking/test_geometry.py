@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from pipeline.tracking.geometry import (
     Camera,
-    cameras_alike,
     fit_camera,
     lens_variance,
     rigid_motion,
     robust_motion,
+    sigma_point_cameras,
 )
 
 seeds = st.integers(0, 2**32 - 1)
@@ -90,7 +90,7 @@ def test_errors_of_a_lens_are_as_large_as_their_variance_says() -> None:
         camera = some_camera(random)
         seen = camera.project(points) + 0.05 * random.normal(size=points.shape)
         found = fit_camera(points, seen, camera.size, 0.05)
-        alike = cameras_alike(points, seen, found)
+        alike = sigma_point_cameras(points, seen, found)
         ((_, variance),) = lens_variance(found, alike, points, motion)
         told = np.sqrt(variance)[0, :, :2]
         moved = found.unproject(camera.project(points + motion[0, :, :2]))

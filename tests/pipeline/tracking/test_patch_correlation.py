@@ -134,7 +134,7 @@ def test_units_are_fitted_alone_as_with_others(
     lone = np.stack([alone.bits(drawn.noisy, units == unit)[unit] for unit in units])
     for threads, at_once in ((1, 100), (4, 16), (4, 3)):
         monkeypatch.setattr(frame_fit, "_THREADS", threads)
-        monkeypatch.setattr(frame_fit, "_AT_ONCE", at_once)
+        monkeypatch.setattr(frame_fit, "_UNITS_PER_TASK", at_once)
         fitting = Fitting(drawn, followed)
         assert (fitting.bits(drawn.noisy) == lone).all()
         some = units % 4 != 1

@@ -9,11 +9,11 @@ import pytest
 
 from benchmarks.tracking.clip_scripts import GRID, ClipScript
 from benchmarks.tracking.rendering import Renderer, View, eight_bit
-from benchmarks.tracking.wild_clips import errors, film, specimen, tracked
+from benchmarks.tracking.wild_clips import errors, film_clip, specimen, track_clip
 from pipeline.tracking.frames import Frame
 from pipeline.tracking.geometry import Camera
 from pipeline.tracking.motion import track_video
-from pipeline.tracking.motion.unit_looks import HIDDEN, STRAYED
+from pipeline.tracking.motion.unit_appearance import HIDDEN, STRAYED
 from sim.core import Floats, Singles
 from tests.tables import refused
 
@@ -33,8 +33,8 @@ def view(pitch: float, exposure: float = 0.0) -> View:
 
 @pytest.mark.parametrize("pitch", [120, pytest.param(60, marks=pytest.mark.slow)])
 def test_quick_motions_are_followed_however_fine_pictures_are(pitch: int, tmp_path: Path) -> None:
-    clip = film(CLIP._replace(view=view(pitch)), tmp_path / "unused.mkv")
-    found = errors(clip, tracked(clip))
+    clip = film_clip(CLIP._replace(view=view(pitch)), tmp_path / "unused.mkv")
+    found = errors(clip, track_clip(clip))
     assert (found.lost, found.gross) == (0.0, 0)
     assert found.rms < 0.01
 
@@ -50,12 +50,12 @@ def test_a_unit_in_view_that_went_too_far_is_not_hidden(tmp_path: Path) -> None:
 
     script = CLIP._replace(view=view(60), cover=covered, times=np.arange(3) / 30)
     script = script._replace(pace=lambda time: 0 * time)
-    clip = film(script, tmp_path / "unused.mkv")
+    clip = film_clip(script, tmp_path / "unused.mkv")
     place = np.round(script.view.project(clip.specimen.centre - clip.specimen.centre.mean(axis=0)))
     aside, under = (
         int(np.argmin(np.linalg.norm(place - at, axis=1))) for at in ((89, 89), (270, 270))
     )
-    track = tracked(clip)
+    track = track_clip(clip)
     assert (track.quality[2, aside], track.quality[2, under]) == (STRAYED, HIDDEN)
 
 
@@ -64,8 +64,8 @@ def test_what_a_blur_leaves_open_is_a_length(tmp_path: Path) -> None:
     """Pixels of half the size lose no more poses for it."""
     script = CLIP._replace(pace=lambda time: np.sin(2 * np.pi * 3 * time) ** 2)
     script = script._replace(view=view(120, 0.008), times=np.arange(14) / 30)
-    clip = film(script, tmp_path / "unused.mkv")
-    assert errors(clip, tracked(clip)).lost == 0.0
+    clip = film_clip(script, tmp_path / "unused.mkv")
+    assert errors(clip, track_clip(clip)).lost == 0.0
 
 
 @pytest.mark.parametrize("pitch", [15, 10, 8])

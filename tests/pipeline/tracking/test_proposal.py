@@ -37,7 +37,7 @@ def test_units_and_what_is_on_them_are_found(kind: str) -> None:
     assert found.kind == kind
     assert len(found.detection.unit) == found.specimen.count
     assert found.pixel_size == pytest.approx(0.365, rel=0.02)
-    assert any("case" in doubt for doubt in found.doubts)
+    assert any("case" in warning for warning in found.warnings)
 
 
 def test_a_mirrored_video_is_seen_as_such() -> None:
@@ -48,8 +48,8 @@ def test_a_mirrored_video_is_seen_as_such() -> None:
 
 def test_units_outside_the_first_frame_are_told() -> None:
     image = np.ascontiguousarray(next(film_of("bare").images())[:, :250])
-    doubts = proposal.propose(image, import_video.design(GRID), SCALE).doubts
-    assert any("units lie outside the first frame" in doubt for doubt in doubts)
+    warnings = proposal.propose(image, import_video.design(GRID), SCALE).warnings
+    assert any("units lie outside the first frame" in warning for warning in warnings)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pipeline.tracking.reference_frame import start_doubt
+from pipeline.tracking.reference_frame import start_warning
 from tests.pipeline.tracking.conftest import tracked
 
 CENTRE = np.stack(np.meshgrid(*2 * [np.arange(8) * 15.0]), axis=-1).reshape(-1, 2)
@@ -20,7 +20,7 @@ def doubt(course: Callable[[float], float], shape: np.ndarray, off: float, frame
     made = np.array([course(frame) for frame in range(frames)])[:, None, None] * shape + noise
     made[:, 3] = np.nan
     residual = off / PIXEL * random.normal(size=CENTRE.shape)
-    return start_doubt(made, CENTRE, residual, PIXEL)
+    return start_warning(made, CENTRE, residual, PIXEL)
 
 
 def test_a_first_frame_in_motion_is_told() -> None:
@@ -58,4 +58,4 @@ def test_units_far_off_the_design_are_told() -> None:
 def test_no_clip_that_starts_at_rest_is_doubted(name: str) -> None:
     specimen, track, _ = tracked(name)
     told, seen = track.displacement[..., :2].astype(float), track.calibration
-    assert start_doubt(told, specimen.centre, seen.residual, seen.pixel) == ""
+    assert start_warning(told, specimen.centre, seen.residual, seen.pixel) == ""

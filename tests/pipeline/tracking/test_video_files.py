@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.tracking.frames import (
-    BrokenOffError,
+    TruncatedVideoError,
     read_frames,
     rendered,
     video_length,
@@ -105,7 +105,7 @@ def test_files_that_end_between_frames_break_off(
     tmp_path: Path, name: str, codec: str, numbers: list[int]
 ) -> None:
     path = cut_after(written(tmp_path / name, numbers, codec), 0.6)
-    with pytest.raises(BrokenOffError, match="should go on"):
+    with pytest.raises(TruncatedVideoError, match="should go on"):
         list(read_frames(path))
 
 
@@ -116,13 +116,13 @@ def test_the_rate_that_is_given_is_that_of_the_camera(tmp_path: Path) -> None:
     assert [frame.index for frame in shown] == list(range(10, 30))
     np.testing.assert_allclose([frame.time for frame in shown], np.arange(10, 30) / 1000)
     cut = cut_after(path, 0.6)
-    with pytest.raises(BrokenOffError, match="should go on") as caught:
+    with pytest.raises(TruncatedVideoError, match="should go on") as caught:
         list(read_frames(cut, rate=1000.0))
     end = float(str(caught.value.remedy).split("end: ")[1].split(" s")[0])
     assert 0.02 < end < 0.06
 
 
-BARE = [
+ELEMENTARY_STREAMS = [
     ("a.h264", "libx264"),
     ("a.hevc", "libx265"),
     ("a.mjpeg", "mjpeg"),
@@ -130,7 +130,7 @@ BARE = [
 ]
 
 
-@pytest.mark.parametrize(("name", "codec"), BARE)
+@pytest.mark.parametrize(("name", "codec"), ELEMENTARY_STREAMS)
 def test_a_bare_stream_has_no_times_but_by_a_rate(tmp_path: Path, name: str, codec: str) -> None:
     path = written(tmp_path / name, list(range(8)), codec)
     with refused("no times", "frame_rate", "frame_rate: '300 Hz'", path):

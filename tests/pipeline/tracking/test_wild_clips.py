@@ -7,7 +7,14 @@ import pytest
 
 from benchmarks.tracking.clip_scripts import SCRIPTS
 from benchmarks.tracking.rendering import Renderer, View, eight_bit, pose_bound
-from benchmarks.tracking.wild_clips import WildClip, errors, film, make, specimen, tracked
+from benchmarks.tracking.wild_clips import (
+    WildClip,
+    errors,
+    film_clip,
+    make_clip,
+    specimen,
+    track_clip,
+)
 from pipeline.runtime import UserError
 from pipeline.tracking.detect import detect_lattice
 from pipeline.tracking.detect.lattice_votes import locate_lattice
@@ -19,8 +26,8 @@ from tests.tables import cases, some, tables
 
 
 def shown(name: str, folder: Path, frames: int) -> tuple[WildClip, Track]:
-    clip = make(name, folder, frames)
-    return clip, tracked(clip)
+    clip = make_clip(name, folder, frames)
+    return clip, track_clip(clip)
 
 
 HEAVY = some(map(tuple, tables("tracking")["heavy_clips"]), 0)
@@ -38,10 +45,10 @@ def test_no_unit_is_wrong(name: str, frames: int, rms: float, lost: float, tmp_p
 
 
 def test_threads_change_no_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    clip, tracks = make("plain", tmp_path, 2), []
+    clip, tracks = make_clip("plain", tmp_path, 2), []
     for threads in (1, 3):
         monkeypatch.setattr(frame_fit, "_THREADS", threads)
-        tracks.append(tracked(clip))
+        tracks.append(track_clip(clip))
     assert np.array_equal(tracks[0].displacement, tracks[1].displacement)
     assert np.array_equal(tracks[0].sigma, tracks[1].sigma)
 
@@ -60,8 +67,8 @@ def test_threads_change_no_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_sigma_holds(name: str, frames: int, tmp_path: Path) -> None:
     clip, track = shown(name, tmp_path, frames)
     assert (track.timing == 0).all()
-    assert errors(clip, track).honesty.min() > 0.7
-    assert errors(clip, track).honesty.max() < 1.4
+    assert errors(clip, track).sigma_ratio.min() > 0.7
+    assert errors(clip, track).sigma_ratio.max() < 1.4
 
 
 def test_a_specimen_is_found_without_a_scale_however_small_it_is() -> None:
@@ -100,8 +107,8 @@ def test_a_slope_of_the_light_does_not_move_outlines(tmp_path: Path) -> None:
         image *= 1 + np.float32(0.15) * np.sin(row / 50 + np.float32(time))
 
     script = SCRIPTS["plain"]._replace(cover=shade, times=np.zeros(1))
-    clip = film(script, tmp_path / "unused.mkv")
-    assert np.abs(tracked(clip).calibration.residual).mean() < 0.01
+    clip = film_clip(script, tmp_path / "unused.mkv")
+    assert np.abs(track_clip(clip).calibration.residual).mean() < 0.01
 
 
 def test_the_bound_of_squares_is_that_of_their_edges() -> None:
@@ -124,7 +131,7 @@ def test_a_picture_shown_again_is_told(tmp_path: Path) -> None:
 
 
 def test_a_camera_that_moves_is_told_of(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    clip = make("tripod_knocked", tmp_path, 14)
+    clip = make_clip("tripod_knocked", tmp_path, 14)
     fixed = RecordingSetup(held=clip.held)
     with caplog.at_level("WARNING"):
         track_video(iter(clip.frames), clip.specimen, clip.scale, setup=fixed)

@@ -57,14 +57,14 @@ def sampled(scene: FilmScene, pose: np.ndarray) -> np.ndarray:
     face = shapely.Polygon(scene.specimen.polygon(0) @ turn + place)
     shapely.prepare(face)
     near = np.linalg.norm(front - place, axis=-1) < 12
-    shade = np.full(pixel.shape[:2], scene.look.board)
+    shade = np.full(pixel.shape[:2], scene.appearance.board)
     rays = shapely.linestrings(np.stack([front[near], back[near]], axis=1))
-    within = np.where(shapely.intersects(face, rays), scene.look.side, scene.look.board)
+    within = np.where(shapely.intersects(face, rays), scene.appearance.side, scene.appearance.board)
     on_face = shapely.contains_xy(face, front[near][:, 0], front[near][:, 1])
-    shade[near] = np.where(on_face, scene.look.face, within)
+    shade[near] = np.where(on_face, scene.appearance.face, within)
     for centre, diameter in zip(scene.marks.centre, scene.marks.diameter, strict=True):
         disc = np.linalg.norm(front - (centre @ turn + place), axis=-1) < diameter / 2
-        shade[disc] = scene.look.mark
+        shade[disc] = scene.appearance.mark
     return shade.reshape(rows, SAMPLES, columns, SAMPLES).mean(axis=(1, 3))
 
 

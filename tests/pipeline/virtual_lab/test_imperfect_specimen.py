@@ -37,7 +37,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Problem, Scene]:
 def made(study: tuple[Problem, Scene], **asked: object) -> xr.Dataset:
     described = {"structure": "altered", "virtual": {"specimen": asked}}
     held = {"altered": PosedStructure(study[1], study[1].lattice.vertices)}
-    return virtual_specimen.dataset(study[0], held, Recording.model_validate(described))
+    return virtual_specimen.specimen_dataset(study[0], held, Recording.model_validate(described))
 
 
 def drive(scene: Scene, **asked: object) -> ImperfectDrive:
@@ -105,7 +105,7 @@ def test_a_specimen_that_cannot_be_is_refused(
     recording = {"structure": "altered", "virtual": {"specimen": {}}} | change
     held = {"altered": PosedStructure(study[1], study[1].lattice.vertices)}
     with pytest.raises(UserError, match=told):
-        virtual_specimen.dataset(study[0], held, Recording.model_validate(recording))
+        virtual_specimen.specimen_dataset(study[0], held, Recording.model_validate(recording))
 
 
 AMPLITUDES = {"force": "1 N", "torque": "1 N mm", "rotation": "3 deg"}
@@ -126,7 +126,7 @@ def test_a_drive_that_the_faults_are_not_of_is_refused(kind: str, tmp_path: Path
     held = {"altered": PosedStructure(scene := scene_of(asked, tmp_path), scene.lattice.vertices)}
     recording = {"structure": "altered", "virtual": {"specimen": NOTHING}}
     with refused(f"drive.kind: {kind}", "virtual.specimen"):
-        virtual_specimen.dataset(asked, held, Recording.model_validate(recording))
+        virtual_specimen.specimen_dataset(asked, held, Recording.model_validate(recording))
 
 
 def test_an_assembled_lattice_is_recognised_and_tracked(files: Path, tmp_path: Path) -> None:

@@ -59,4 +59,4 @@ def test_a_frame_is_exposed_no_longer_than_it_lasts() -> None:
     slow, quick = noise_planning.setup_combinations(base, tried)
     assert slow.setup.sensor.exposure == VirtualRecording().sensor.exposure
     assert quick.setup.sensor.exposure == 0.0005
-    assert [each.words["exposure_ms"] for each in (slow, quick)] == ["1", "0.5"]
+    assert [each.columns["exposure_ms"] for each in (slow, quick)] == ["1", "0.5"]

@@ -205,8 +205,8 @@ def test_a_compiler_that_compiles_for_its_processor_is_told_another(
     made: list[list[str]] = []
     monkeypatch.setattr(compiler, "compiler", lambda _: ["python", "-m", "ziglang", "cc"])
     monkeypatch.setattr(compiler, "can_pin", lambda: pins)
-    monkeypatch.setattr(compiler, "_make", lambda _, command: made.append(command))
-    compiler._compiled(loops(tmp_path), tmp_path / "loops.so", ["-O3"])
+    monkeypatch.setattr(compiler, "_run_compiler", lambda _, command: made.append(command))
+    compiler._compile(loops(tmp_path), tmp_path / "loops.so", ["-O3"])
     assert [word for word in made[0] if word.startswith("-m") and word != "-m"] == [flag]
 
 

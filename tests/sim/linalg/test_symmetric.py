@@ -36,12 +36,12 @@ def networks() -> dict[str, tuple[Floats, Ints]]:
     bonded = squares.ligament_units
     corner = np.array([k for k in range(72) if k % 9 < 8])
     diagonal = np.stack([corner, corner + 10], axis=1)
-    apart = bonded[(bonded != 40).all(axis=1) & (bonded // 9 != 6).all(axis=1)]
+    separate = bonded[(bonded != 40).all(axis=1) & (bonded // 9 != 6).all(axis=1)]
     return {
         "squares": (squares.site, bonded),
         "diagonals": (squares.site, np.concatenate([bonded, diagonal])),
         "polygons": (mixed.site, mixed.ligament_units),
-        "pieces": (squares.site, apart),
+        "pieces": (squares.site, separate),
     }
 
 
@@ -95,23 +95,23 @@ def parents(fronts: Fronts) -> Ints:
 
 
 @pytest.fixture
-def apart(monkeypatch: pytest.MonkeyPatch) -> None:
+def parallel(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lets threads share matrices that are far too small for that."""
-    monkeypatch.setattr(nested_dissection, "LEAST_APART", 1)
+    monkeypatch.setattr(nested_dissection, "LEAST_PARALLEL_WORK", 1)
 
 
-@pytest.mark.usefixtures("apart")
+@pytest.mark.usefixtures("parallel")
 @pytest.mark.parametrize("name", ["squares", "diagonals", "pieces"])
 def test_threads_factorise_to_the_same_bits(name: str) -> None:
     made = filled(name, "fronts")
     alone, shared = made._replace(values=made.values.copy()), made._replace(threads=3)
-    assert made.pattern.fronts.apart.any()
+    assert made.pattern.fronts.parallel.any()
     assert factorise(alone)
     assert factorise(shared)
     np.testing.assert_array_equal(shared.values, alone.values)
 
 
-@pytest.mark.usefixtures("apart")
+@pytest.mark.usefixtures("parallel")
 @pytest.mark.parametrize("place", [0, 60, 120, -1])
 def test_what_one_thread_finds_indefinite_is_not_factorised(place: int) -> None:
     made = filled("squares", "fronts")._replace(threads=4)
@@ -120,7 +120,7 @@ def test_what_one_thread_finds_indefinite_is_not_factorised(place: int) -> None:
     assert not factorise(made)
 
 
-@pytest.mark.usefixtures("apart")
+@pytest.mark.usefixtures("parallel")
 @pytest.mark.parametrize("seed", range(10))
 def test_what_threads_share_has_runs_and_memory_of_its_own(seed: int) -> None:
     """Also where units are missing, so that a part may not be next to the cut that made it."""
@@ -128,9 +128,9 @@ def test_what_threads_share_has_runs_and_memory_of_its_own(seed: int) -> None:
     fronts = number_free_dofs(site, pairs, np.zeros(0, dtype=int), ("fronts",))[1].fronts
     n, up = len(fronts.update), parents(fronts)
     ends, sizes = fronts.update + np.diff(fronts.edge) ** 2, np.diff(fronts.edge)
-    assert fronts.apart.any() or seed > 2
+    assert fronts.parallel.any() or seed > 2
     side_by_side = [(0, n - 1)]
-    for split in np.flatnonzero(fronts.apart)[::-1].tolist():
+    for split in np.flatnonzero(fronts.parallel)[::-1].tolist():
         first, last = next(run for run in side_by_side if run[1] == split)
         children = fronts.children[fronts.child[split] : fronts.child[split + 1]].tolist()
         firsts = [first, *(child + 1 for child in children)]
@@ -141,10 +141,10 @@ def test_what_threads_share_has_runs_and_memory_of_its_own(seed: int) -> None:
         assert all(up[k] in run or k == last or up[k] < 0 for k in run)
         for front in (k for k in run if sizes[k]):
             waiting = [k for k in range(n) if k not in run or k < front <= up[k]]
-            apart = (ends[waiting] <= fronts.update[front]) | (
+            separate = (ends[waiting] <= fronts.update[front]) | (
                 fronts.update[waiting] >= ends[front]
             )
-            assert (apart | (sizes[waiting] == 0)).all()
+            assert (separate | (sizes[waiting] == 0)).all()
 
 
 def porous(seed: int) -> tuple[Floats, Ints]:
@@ -181,8 +181,8 @@ def test_every_dof_is_numbered_once(storage: Storage) -> None:
         np.testing.assert_array_equal(np.sort(free[free >= 0]), np.arange(pattern.n_dofs))
         if storage == "band":
             places = np.where(free < 0, np.nan, free).reshape(-1, 3)[pairs].reshape(len(pairs), 6)
-            apart = np.nanmax(places, axis=1) - np.nanmin(places, axis=1)
-            assert apart.max() <= pattern.size[1]
+            separate = np.nanmax(places, axis=1) - np.nanmin(places, axis=1)
+            assert separate.max() <= pattern.size[1]
 
 
 @pytest.mark.parametrize(

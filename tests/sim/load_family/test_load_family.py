@@ -27,7 +27,7 @@ from sim.load_family.family_losses import LoadLoss
 from sim.load_family.worst_load import search_worst
 from sim.optimise import Evaluation, Journal, Result, SqpOptions, minimise
 from sim.scene import Clamp, Scene, parameters_of_copies, parameters_of_design, simulate
-from sim.solvers import DISPLACEMENT, FREE, Harmonic, LinearRamp, PrescribedMotion, Together
+from sim.solvers import DISPLACEMENT, FREE, Harmonic, LinearRamp, PrescribedMotion, Superposition
 from sim.structure import Perturbation, draw_copies
 from tests.sim.scene.test_plan import design_of, scene
 from tests.sim.structures import central
@@ -64,7 +64,7 @@ def in_two_setups() -> tuple[LoadFamily, Scene]:
     def other(of: Scene) -> Scene:
         corners = of.lattice.positions(np.array([0, 6, 42, 48]))
         control = np.array([[DISPLACEMENT, FREE, DISPLACEMENT], [FREE, DISPLACEMENT, DISPLACEMENT]])
-        drive = PrescribedMotion(corners[1:3], Together(ramps, np.eye(2)), control)
+        drive = PrescribedMotion(corners[1:3], Superposition(ramps, np.eye(2)), control)
         reference = of.objective.reference
         return of.updated(
             cases=(drive,),
@@ -72,7 +72,7 @@ def in_two_setups() -> tuple[LoadFamily, Scene]:
             reference=reference and other(reference),
         )
 
-    mixed = LoadSetup(Together(ramps, np.eye(2)), (0.5, 1.5), (1.0, 6.0), scene=other(held))
+    mixed = LoadSetup(Superposition(ramps, np.eye(2)), (0.5, 1.5), (1.0, 6.0), scene=other(held))
     return LoadFamily((PUSHING, mixed)), held
 
 

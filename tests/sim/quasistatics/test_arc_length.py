@@ -36,9 +36,9 @@ def test_a_path_turns_where_the_structure_snaps_and_its_points_are_equilibria() 
     back, forward = found.turns
     assert found.loads[back] == pytest.approx(record.snaps[0], abs=1e-7)
     assert found.loads[forward] < found.loads[back]
-    assert not found.falling[:back].any()
-    assert (found.falling[back + 1 : forward] == 1).all()
-    assert not found.falling[forward + 1 :].any()
+    assert not found.n_negative[:back].any()
+    assert (found.n_negative[back + 1 : forward] == 1).all()
+    assert not found.n_negative[forward + 1 :].any()
     system = system_of(rig.topology, values)
     work = workspace(system)
     free, scale = rig.topology.free_dofs, rig.topology.scale[rig.topology.free_dofs]
@@ -57,7 +57,7 @@ def test_a_path_turns_where_the_structure_snaps_and_its_points_are_equilibria() 
             tangent[:, column] = (force(state + shift) - force(state - shift)) / (2.0 * step)
         spectrum = np.linalg.eigvalsh((tangent + tangent.T) / 2.0)
         if abs(spectrum[0]) > 1e-6:  # at a turn it is zero but for rounding
-            assert np.count_nonzero(spectrum < 0.0) == found.falling[k]
+            assert np.count_nonzero(spectrum < 0.0) == found.n_negative[k]
         assert found.eigenvalue[k] == pytest.approx(spectrum[0], rel=1e-3, abs=1e-5)
 
 
@@ -86,7 +86,7 @@ def test_modes_are_those_nearest_to_zero_from_below(size: int) -> None:
     """However large the structure is."""
     values = np.append([-3.0, -2.0, -1.0], np.arange(1.0, size - 2))
     tangent = Tangent(sp.csc_array(sp.diags_array(values)), np.ones(size))
-    assert tangent.falling == 3
+    assert tangent.n_negative == 3
     for count in (1, 2, 3):
         np.testing.assert_allclose(np.sort(tangent.lowest(count)[0])[::-1], values[2::-1][:count])
     stable = Tangent(sp.csc_array(sp.diags_array(np.abs(values) + 1.0)), np.ones(size))

@@ -7,7 +7,7 @@ import numpy as np
 import sim
 from sim.energy import observe
 from sim.scene import drive_force
-from sim.solvers import Together
+from sim.solvers import Superposition
 from tests.sim.scene.test_plan import scene as seven_by_seven
 from tests.sim.structures import LEFT, pressed
 
@@ -57,7 +57,7 @@ def test_each_case_has_the_force_of_its_own_units() -> None:
     """Of two sides pressed at once it is that of the first, the other's being opposite."""
     right = LEFT + 4
     ways = sim.LinearRamp(1.0, 1.0), sim.LinearRamp(-1.0, 1.0)
-    both = Together(ways, np.repeat(np.eye(2), 5, axis=0))
+    both = Superposition(ways, np.repeat(np.eye(2), 5, axis=0))
     alone = (sim.PrescribedMotion(*side) for side in zip((LEFT, right), ways, strict=True))
     for cases, units in (
         (tuple(alone), (LEFT, right)),

@@ -17,7 +17,7 @@ from sim.scene import (
     strain_energies,
 )
 from sim.scene.objectives import RelativeMimicking, extent
-from sim.solvers import Harmonic, LinearRamp, PrescribedMotion, TimeSeries, Together
+from sim.solvers import Harmonic, LinearRamp, PrescribedMotion, Superposition, TimeSeries
 from sim.time_integration import simpson_weights
 from tests.sim.load_family.test_load_family import mimicked
 from tests.sim.scene.test_plan import design_of
@@ -104,7 +104,7 @@ def test_the_force_is_that_of_the_units_of_each_drive() -> None:
     """The other side, held for another case or driven as well, carries the opposite force."""
     ways = LinearRamp(1.0, 1.0), LinearRamp(-1.0, 1.0)
     left, right = map(PrescribedMotion, (LEFT, LEFT + 4), ways)
-    both = PrescribedMotion(SIDES, Together(ways, np.repeat(np.eye(2), 5, axis=0)))
+    both = PrescribedMotion(SIDES, Superposition(ways, np.repeat(np.eye(2), 5, axis=0)))
     for cases, sides in (((left, right), (LEFT, LEFT + 4)), ((both,), (LEFT,))):
         scene = squeezed_between(*cases)
         measure, response = mimicking(scene), simulate(scene)

@@ -12,7 +12,7 @@ from sim.constraints import ConstraintVector
 from sim.core import Floats
 from sim.optimise import Journal, Result
 from sim.scene import PathConstraints, foil_strains, path_constraints
-from sim.scene.evaluation import _from_rest
+from sim.scene.evaluation import _confirmation
 from sim.solvers import solve_cases
 from sim.structure import Copies, FoilLimit
 from tests.sim.structures import central, pressed, taylor_orders
@@ -93,7 +93,7 @@ def test_a_snap_is_a_value_that_leads_out_of_it() -> None:
     way = np.random.default_rng(1).normal(size=len(snapping))
     slope = central(lambda step: constraint(snapping + step * way)[0][load], 1e-5)
     assert (jacobian @ way)[load] == pytest.approx(float(slope), rel=1e-3)
-    led = constraint.drawn_back(snapping)
+    led = constraint.recover_start(snapping)
     assert constraint(led)[0].min() >= 0.0
     assert not sim.simulate(posed, led).records[0].jumped.any()
     assert np.abs(led - snapping).max() < 0.5
@@ -126,7 +126,7 @@ def test_a_journal_remembers_constraints_under_loads(
 def test_a_design_that_snaps_is_not_confirmed() -> None:
     """Also one that snaps between the loads of the loss alone."""
     posed, snapping = scene(0.2), best_design(None).x
-    confirm = _from_rest(posed, sim.make_plan(posed))
+    confirm = _confirmation(posed, sim.make_plan(posed))
     assert confirm is not None
     assert np.isfinite(confirm(np.zeros_like(snapping))[0])
     with pytest.raises(sim.SimulationError, match="snaps at"):
@@ -147,7 +147,7 @@ def test_imperfect_copies_may_snap_where_the_perfect_structure_does_not(
     caplog.set_level("INFO")
     for sign, design in ((1, np.zeros_like(snapping)), (-1, snapping)):
         copied = posed.updated(copies=Copies(sign * shifts, stiffness))
-        confirm = _from_rest(copied, sim.make_plan(copied))
+        confirm = _confirmation(copied, sim.make_plan(copied))
         assert confirm is not None
         if sign > 0:
             assert np.isfinite(confirm(design)[0])

@@ -11,7 +11,7 @@ import pytest
 import sim
 from benchmarks.scenes import MATERIAL
 from sim.scene import concrete_parameters, estimated_errors, sample_times, scales
-from sim.scene.time_solver import RULES, different_drives, expected_steps
+from sim.scene.time_solver import RULES, distinct_drives, expected_steps
 from sim.solvers import FORCE, breakpoints, solve_case
 from sim.structure import ContactModel
 from sim.time_integration import ExplicitSolver, ImplicitSolver
@@ -86,7 +86,7 @@ def test_a_pushed_structure_that_floats_is_followed_as_by_explicit_steps() -> No
 def test_numbers_of_a_drive_may_be_arrays() -> None:
     one, other = sim.Harmonic(3.0, 5.0, 0.6), sim.Harmonic(jnp.array(3.0), jnp.array(5.0), 1.0)
     scene = posed(one)
-    assert len(different_drives(scene.driven_by(one, other))) == 1
+    assert len(distinct_drives(scene.driven_by(one, other))) == 1
 
 
 @pytest.mark.parametrize("drive", some(["a short late pulse", "a spike"], 1))
@@ -166,7 +166,7 @@ def test_drives_that_differ_by_direction_are_tried_once() -> None:
     scene = seven_by_seven(
         (*(sim.Harmonic(3.0, 5.0, k) for k in (0.0, 1.0)), sim.Harmonic(3.0, 6.0))
     )
-    assert len(different_drives(scene)) == 2
+    assert len(distinct_drives(scene)) == 2
 
 
 def test_the_change_of_a_loss_may_vanish_but_not_its_stated_error() -> None:

@@ -20,8 +20,8 @@ from sim.solvers import (
     PrescribedMotion,
     Pulse,
     Solver,
+    Superposition,
     TimeSeries,
-    Together,
     Turning,
     held_values,
     solve_case,
@@ -102,7 +102,7 @@ def test_displacements_are_reciprocal() -> None:
 
     def pushed(which: int) -> Floats:
         motions = tuple(LinearRamp(1e-6, 1.0, directions[unit]) for unit in (12, 17))
-        only = Together(motions, np.diag(shares[which]))
+        only = Superposition(motions, np.diag(shares[which]))
         return static(rig(only, [[FORCE] * 3] * 2, [12, 17]))[-1]
 
     def along(motion: Floats, unit: int) -> float:
@@ -159,7 +159,7 @@ def test_the_work_of_a_load_is_part_of_the_energy() -> None:
 
 def test_forces_are_shared_as_asked() -> None:
     ramps = (LinearRamp(2.0, 1.0), Turning(LinearRamp(3.0, 1.0)))
-    motion = Together(ramps, np.array([[0.25, 0.0], [0.75, 1.0]]))
+    motion = Superposition(ramps, np.array([[0.25, 0.0], [0.75, 1.0]]))
     drive = PrescribedMotion(
         np.array([7, 3]), motion, np.array([[FORCE] * 3, [FORCE, FREE, FORCE]])
     )

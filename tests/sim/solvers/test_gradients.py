@@ -20,7 +20,15 @@ import sim
 from benchmarks.scenes import CUTOFF
 from sim.core import Floats
 from sim.quasistatics import StaticSolver
-from sim.solvers import DISPLACEMENT, FORCE, Solver, Together, adjoint_cases, concrete, solve_cases
+from sim.solvers import (
+    DISPLACEMENT,
+    FORCE,
+    Solver,
+    Superposition,
+    adjoint_cases,
+    concrete,
+    solve_cases,
+)
 from sim.time_integration import (
     BLANES_MOAN,
     LEAPFROG,
@@ -81,7 +89,7 @@ def pushed(slowly: bool) -> structures.Rig:
     )
     shares = np.array([[1.0], [-0.3]])
     control = np.array([[FORCE, FORCE, DISPLACEMENT], [FORCE] * 3])
-    forces, driven = Together((course,), shares), np.array([12, 18])
+    forces, driven = Superposition((course,), shares), np.array([12, 18])
     return structures.Rig(
         structures.rotating_squares(), structures.CORNERS, driven, forces, control=control
     )

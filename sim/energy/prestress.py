@@ -1,4 +1,4 @@
-"""Counts motion and strain from where units rest whose ligaments are not free of stress."""
+"""Derives structures with prestressed ligaments at rest: places, natural strains, parameters."""
 
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ from sim.structure import Lattice, LatticeArrays, Parameters
 
 
 class RestState(NamedTuple):
-    """Describes a structure as it rests."""
+    """Holds a prestressed structure at rest."""
 
     vertices: Array  # (n_vertices, 2) there, mm
     vector: Array  # (n_ligaments, 2) ligaments there, mm
@@ -25,7 +25,7 @@ class RestState(NamedTuple):
 def rest_state(
     lattice: Lattice | LatticeArrays, values: Parameters[Any], motion: Numbers
 ) -> RestState:
-    """Moves units as rigid bodies, and tells ligaments' natural states from their new vectors.
+    """Moves units as rigid bodies, and computes the natural states of their ligaments.
 
     So energies and forces of a motion from there are those of the motion before and from there. The
     values are those of the structure as designed, `motion` (n_units, 3) leads from there to rest,
@@ -50,7 +50,7 @@ def rest_state(
     return RestState(vertices, vector, shear, values.natural - jnp.stack(strain, axis=1))
 
 
-def counted_from_rest(
+def parameters_at_rest(
     lattice: Lattice | LatticeArrays, values: Parameters[Array], motion: Array
 ) -> Parameters[Array]:
     """Derives the parameters of a structure as it rests; arguments of `rest_state`."""
@@ -60,7 +60,7 @@ def counted_from_rest(
     return values._replace(
         arm=corner[lattice.ligaments],
         vector=rest.vector,
-        void=values.void + _opened(lattice, motion),
+        void=values.void + _void_opening(lattice, motion),
         law=values.law.at[:, 1].set(rest.shear_stiffness),
         natural=rest.natural,
         corner=corner,
@@ -68,7 +68,7 @@ def counted_from_rest(
     )
 
 
-def _opened(lattice: Lattice | LatticeArrays, motion: Array) -> Array:
+def _void_opening(lattice: Lattice | LatticeArrays, motion: Array) -> Array:
     """Computes by how much void angles (n_ligaments, 2) grow, rad; see `void_angles`."""
     a, b = lattice.unit[lattice.ligaments].T
     more = motion[a, 2] - motion[b, 2]

@@ -1,4 +1,4 @@
-"""Judges fits of units by how these look in the first frame, and says why others are missing."""
+"""Accepts fits by the units' appearance in the first frame; gives reasons of missing units."""
 
 import numpy as np
 
@@ -12,25 +12,25 @@ SHARE = 0.35
 """Least part of a unit's information that a fit needs; less if photometry and place are known."""
 SHARE_KNOWN = 0.18
 
-_SETTLED = 0.3
+_LAST_STEP = 0.3
 """Last Gauss-Newton step of a fit that found its place, px."""
-_PARTLY, _SHADED = 0.6, (0.06, 0.15)
+_PARTLY_SEEN, _SHADED = 0.6, (0.06, 0.15)
 """Brightness of a unit that is seen as before: changes of slopes from which its fit has to be
 better, and from which one that is seen in part, less than so much, is none."""
 _GAIN = (0.12, 4.0)
 """Gain, against the first frame's, between which a unit can be seen."""
-_SHARP = 0.7
+_BLURRED_SHARE = 0.7
 """Part of a unit that has to be seen where its motion may have blurred it."""
 _FADED = 0.4
 """Gain, against the first frame's, of what is no longer the unit but something before it."""
-_WHITE, _GLARING = 234.0, 0.4
+_WHITE, _GLARE_SHARE = 234.0, 0.4
 """Level from which pixels are saturated, which in a video may be 235; part of them in glare."""
-_MISFIT = 0.15
+_LARGEST_RESIDUAL = 0.15
 """Residuals of a good fit, in contrasts of the unit; or so many times the first frame's: """
-_NOISIER = 4.0
+_RESIDUAL_RATIO = 4.0
 
 
-class UnitLooks:
+class ReferenceAppearance:
     """Holds gains and residuals of units in the first frame.
 
     Args:
@@ -52,7 +52,9 @@ class UnitLooks:
         self._gain = np.where(np.isfinite(gain), gain, 1.0)
         noise = np.fmax(np.where(np.isfinite(relative), relative, usual), usual)
         self.noise = np.maximum(noise, sensor_noise / self._gain)
-        self._limit = np.maximum(_NOISIER * self.noise, _MISFIT * templates.contrast)
+        self._limit = np.maximum(
+            _RESIDUAL_RATIO * self.noise, _LARGEST_RESIDUAL * templates.contrast
+        )
         self._seen = seen
         white = ((templates.brightness >= _WHITE) * templates.weight).sum(axis=(1, 2))
         self._white = white / np.maximum(templates.weight.sum(axis=(1, 2)), 1e-9)
@@ -60,7 +62,7 @@ class UnitLooks:
     def accepted(
         self, fits: PoseFits, photometry: Floats, share: float, quick: Mask | None
     ) -> Mask:
-        """Judges fits (units,); the less of a unit is seen, the better its fit has to be.
+        """Accepts fits (units,); the less of a unit is seen, the better its fit has to be.
 
         `photometry` is that of the frame before; `quick` units may be blurred by their motion.
         """
@@ -71,15 +73,15 @@ class UnitLooks:
         part = np.where(shaded < _SHADED[0], 0.5 * (1 + seen), seen)
         with np.errstate(invalid="ignore", divide="ignore"):
             fitting = fits.noise / np.abs(gain) < self._limit * part
-        settled = fits.last < _SETTLED * seen**2
+        settled = fits.last_step < _LAST_STEP * seen**2
         if quick is not None:
-            fitting &= ~(quick & (seen < _SHARP))
-        settled &= (seen > _PARTLY) | (shaded < _SHADED[1])
+            fitting &= ~(quick & (seen < _BLURRED_SHARE))
+        settled &= (seen > _PARTLY_SEEN) | (shaded < _SHADED[1])
         lit = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
         return np.isfinite(fits.pose[:, 0]) & settled & fitting & lit & self._seen
 
     def reasons(self, fits: PoseFits, good: Mask, inside: Mask, white: Floats) -> Ints:
-        """Says of each unit that it is `good`, or why it is missing.
+        """Classifies each unit as `good`, or by the reason why it is missing.
 
         `inside` are in view; `white` is the part of their pixels that is saturated.
         """
@@ -87,7 +89,7 @@ class UnitLooks:
         reasons = np.full(len(good), HIDDEN)
         reasons[np.isfinite(fits.pose[:, 0]) & (fits.share > SHARE)] = POOR_FIT
         reasons[(relative < _FADED) & (fits.photometry[:, 1] > 0)] = HIDDEN
-        reasons[white > self._white + _GLARING] = GLARE
+        reasons[white > self._white + _GLARE_SHARE] = GLARE
         reasons[~self._seen] = HIDDEN
         reasons[~inside] = OUT_OF_FRAME
         reasons[good] = GOOD
