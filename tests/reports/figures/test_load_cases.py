@@ -31,7 +31,7 @@ from reports.figures.shielding import facts as shielding
 from reports.study import StudyResults, evaluation_count
 from tests.reports import figure_assertions, recorded_study
 from tests.reports.compressed_study import SHIELD, written
-from tests.tables import cases
+from tests.tables import cases, some
 
 FIG4 = Path(__file__).parents[3] / "experiments/fig4/problem.yaml"
 PATH = abscissa.Abscissa("displacement", "u", "mm", np.array([0.0, 15.0]), True, None, (0, 1))
@@ -116,9 +116,9 @@ def test_snapshots_of_many_recordings_are_told_apart(two: StudyResults, tmp_path
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
 
 
-@pytest.mark.parametrize("filmed", [(), ("cloaked",), ("altered", "cloaked")])
+@pytest.mark.parametrize("filmed", some([[], ["altered", "cloaked"], ["cloaked"]]))
 def test_snapshots_of_many_loads_are_wrapped(
-    two: StudyResults, tmp_path: Path, filmed: tuple[str, ...]
+    two: StudyResults, tmp_path: Path, filmed: list[str]
 ) -> None:
     """In a single row those of four loads, and as many recordings, were as wide as a letter."""
     many = in_many(two, 4)

@@ -99,7 +99,7 @@ def test_a_snap_is_a_value_that_leads_out_of_it() -> None:
     assert np.abs(led - snapping).max() < 0.5
 
 
-@pytest.mark.parametrize("kept", [1.0, 0.6, 0.3])
+@pytest.mark.parametrize("kept", some([0.6, 1.0, 0.3], 1))
 def test_a_journal_remembers_constraints_under_loads(
     kept: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
