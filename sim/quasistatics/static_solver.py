@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from sim.solvers import (
     check_connected,
     check_ligaments,
     check_start,
-    missed_peaks,
 )
 from sim.structure import ConcreteParameters
 
@@ -82,9 +81,8 @@ class StaticSolver:
     ) -> tuple[Floats, Floats, StaticRecord]:
         """See ``Solver``."""
         check_connected(self.topology)
-        passed, last = self._load_steps(drive)
-        loads = drive.values(self.topology.held, passed)
-        branch = _empty_branch(len(loads), self.topology.n_dofs)
+        loads = self._loads(drive)
+        branch = _empty_branch(len(loads.values), self.topology.n_dofs)
         counts, progress = np.zeros(4, dtype=np.int64), np.zeros(4)
         top = self.topology
         system = system_of(top, values)
@@ -100,38 +98,35 @@ class StaticSolver:
                 values, loads, reached, progress, top, system, branch, counts
             )
         raise_new_pairs(system.contacts)
-        if reached < len(loads):
+        if reached < len(loads.values):
             if self.leaves or not branch.jumped[reached]:
-                raise self._no_equilibrium(values, branch.states[: reached + 1], fraction, last)
+                raise self._no_equilibrium(values, branch.states[: reached + 1], fraction, loads)
             branch.states[reached:] = np.nan
         check_ligaments(top, values, branch.states[:reached])
-        record = _record(branch, counts, top, passed, last)
+        record = _record(branch, counts, top, loads)
         return record.states.copy(), np.zeros_like(record.states), record
 
     def _follow_path(
-        self, values: ConcreteParameters, loads: Floats, known: int, progress: Floats,
+        self, values: ConcreteParameters, loads: _Loads, known: int, progress: Floats,
         top: Topology, system: System, branch: Branch, counts: Ints,
     ) -> tuple[int, float]:  # fmt: skip
         """Follows the path on from its first `known` loads; see ``follow``."""
-        bends, trusted = self._path_curvature(branch.states)
-        rounding = ROUNDING + ROUNDING_OF_MOTION * np.abs(loads * top.scale[top.held]).max(
+        bends, trusted = self._path_curvature(branch.states, loads.output)
+        rounding = ROUNDING + ROUNDING_OF_MOTION * np.abs(loads.values * top.scale[top.held]).max(
             initial=0
         )
         floor = max(self.absolute, rounding) * float(values.law[:, 0].max())
         drag = system.damping if (system.damping[top.free_dofs] > 0).all() else top.scale**2
         return follow(
-            loads, known, progress, bends, trusted, self.leaves, self.sense, system,
+            loads.values, known, progress, bends, trusted, self.leaves, self.sense, system,
             workspace(system, self.threads), self.relative, floor, drag, branch, counts,
         )  # fmt: skip
 
     def _no_equilibrium(
-        self, values: ConcreteParameters, states: Floats, fraction: float, last: Ints
+        self, values: ConcreteParameters, states: Floats, fraction: float, loads: _Loads
     ) -> SimulationError:
-        """Explains that no equilibrium was found beyond the last of the states.
-
-        Of the loads, those numbered in `last` (n_times,) are output.
-        """
-        top, output = self.topology, last[last < len(states) - 1]
+        """Explains that no equilibrium was found beyond the last of the states."""
+        top, output = self.topology, loads.output[loads.output < len(states) - 1]
         where = top.smallest_void_angles(values.void, states[-1].reshape(-1, 3)).argmin()
         unit = int(top.ligament_units[where, 0])
         return SimulationError(
@@ -151,27 +146,37 @@ class StaticSolver:
         left = np.arange(self.substeps - 1, -1, -1) / self.substeps
         return (self.output_times[:, None] - way[:, None] * left).ravel()
 
-    def _load_steps(self, drive: PrescribedMotion) -> tuple[Floats, Ints]:
-        """Lists the load parameters of all loads, and the numbers (n_times,) of the output ones.
+    def _loads(self, drive: PrescribedMotion) -> _Loads:
+        """Lists all loads that a path passes.
 
         What a structure does there depends on how far it was moved before: the peaks of a series
         between two output loads are passed as well.
         """
         stops: list[float] = []
         last = []
-        for start, end in pairwise([0.0, *self.output_times.tolist()]):
-            peaks = missed_peaks(drive.motion, start, end)
-            stops += [*(peaks if end > start else peaks[::-1]).tolist(), end]
+        found = drive.passed_peaks(self.output_times, self.topology.rotation_scale)
+        for end, peaks in zip(self.output_times.tolist(), found, strict=True):
+            stops += [*peaks.tolist(), end]
             last.append(len(stops) * self.substeps - 1)
-        return replace(self, output_times=np.array(stops)).passed, np.array(last, dtype=np.int64)
+        passed = replace(self, output_times=np.array(stops)).passed
+        values = drive.values(self.topology.held, passed)
+        return _Loads(values, passed, np.array(last, dtype=np.int64))
 
-    def _path_curvature(self, states: Floats) -> tuple[Floats, Ints]:
-        """Computes the departure of the start's path from its tangents, and where it may serve."""
+    def _path_curvature(self, states: Floats, output: Ints) -> tuple[Floats, Ints]:
+        """Computes the departure of the start's path from its tangents, and where it may serve.
+
+        The start knows the output loads alone, numbered in `output` (n_times,): its steps serve
+        where no other load is passed between two of them.
+        """
         start = self.start
-        if start is None or start.states.shape != states.shape:
-            return states, np.zeros(len(states), dtype=np.int64)
+        bends, trusted = np.zeros_like(states), np.zeros(len(states), dtype=np.int64)
+        if start is None or start.states.shape != (len(output), states.shape[1]):
+            return bends, trusted
+        direct = np.diff(output, prepend=-1) == 1
         steps = np.diff(start.states, axis=0, prepend=0.0)
-        return steps - start.tangents, (start.jumped == 0).astype(np.int64)
+        bends[output[direct]] = (steps - start.tangents)[direct]
+        trusted[output[direct]] = start.jumped[direct] == 0
+        return bends, trusted
 
     def backward(
         self, values: ConcreteParameters, record: StaticRecord, bar_u: Floats, bar_v: Floats
@@ -193,6 +198,14 @@ class StaticSolver:
         return as_values(bars, top.n_units), self.output_times, bars.drive
 
 
+class _Loads(NamedTuple):
+    """Holds the loads of a path: those that are output, and others between them."""
+
+    values: Floats  # (n_loads, n_held) of the held dofs
+    passed: Floats  # (n_loads,) load parameters
+    output: Ints  # (n_times,) numbers of the output ones
+
+
 def _empty_branch(n_loads: int, n_dofs: int) -> Branch:
     states, tangents = (np.zeros((n_loads, n_dofs)) for _ in range(2))
     stable, jumped = (np.zeros(n_loads, dtype=np.int64) for _ in range(2))
@@ -209,10 +222,9 @@ def _clear(branch: Branch, known: int) -> None:
     branch.snaps[branch.snaps >= known] = np.nan
 
 
-def _record(
-    branch: Branch, counts: Ints, topology: Topology, passed: Floats, last: Ints
-) -> StaticRecord:
-    """Records the output loads, numbered in `last` (n_times,), of all that were passed."""
+def _record(branch: Branch, counts: Ints, topology: Topology, loads: _Loads) -> StaticRecord:
+    """Records the output loads of all that were passed."""
+    passed, last = loads.passed, loads.output
     before, first = np.concatenate([[0.0], passed[:-1]]), np.append(0, last[:-1] + 1)
     snapped = before + branch.snapped * (passed - before)
     places = branch.snaps[np.isfinite(branch.snaps)]

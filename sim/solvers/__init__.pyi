@@ -25,7 +25,6 @@ from .loads import Turning as Turning
 from .loads import breakpoints as breakpoints
 from .loads import held_dofs as held_dofs
 from .loads import held_values as held_values
-from .loads import missed_peaks as missed_peaks
 from .loads import single_motions as single_motions
 from .prescribed_motion import PrescribedMotion as PrescribedMotion
 from .prescribed_motion import SelectedMotion as SelectedMotion

@@ -125,7 +125,7 @@ class LinearRamp(NamedTuple):
 class Superposition(NamedTuple):
     """Moves each driven unit by a sum of motions."""
 
-    motions: tuple[MotionLaw, ...]  # (n_motions,) of one course for all units each
+    motions: tuple[MotionLaw, ...]  # (n_motions,) each of one history for all units
     shares: Floats | Array  # (n_units, n_motions) of each motion in that of each unit
 
     def __call__(self, times: Numbers) -> Numbers:
@@ -138,7 +138,8 @@ class Superposition(NamedTuple):
 class TimeSeries(NamedTuple):
     """Follows a measured motion, interpolated linearly.
 
-    A path of equilibria passes its peaks, though they lie between output loads.
+    A path of equilibria passes its peaks, though they lie between output loads; corners that are no
+    peaks of a component are cut there.
 
     Attributes:
         times: (n,) s, ascending.
@@ -187,29 +188,10 @@ def _kinks(times: Floats, motion: Floats) -> Floats:
     return np.asarray(times[noticed])
 
 
-def missed_peaks(motion: MotionLaw, start: float, end: float) -> Floats:
-    """Finds times (n,) between two others at which a series is beyond what it is at both, s.
-
-    They are those of the largest and the smallest value of each component, ascending; one that
-    exceeds both ends by less than is noticed is left out.
-    """
+def series_times(motion: MotionLaw) -> Floats:
+    """Lists the times (n,) of the points of all series in a motion, ascending, s."""
     series = (one for one in single_motions(motion) if isinstance(one, TimeSeries))
-    found = [_peaks(one, min(start, end), max(start, end)) for one in series]
-    return np.unique(np.concatenate(found)) if found else np.zeros(0)
-
-
-def _peaks(series: TimeSeries, start: float, end: float) -> Floats:
-    times = np.asarray(series.times, dtype=float)
-    between = np.flatnonzero((times > start) & (times < end))
-    if not len(between):
-        return np.zeros(0)
-    flat = np.asarray(series.motion, dtype=float).reshape(len(times), -1)
-    ends = np.stack([np.interp([start, end], times, column) for column in flat.T], axis=1)
-    noticed, found = NOTICED * np.ptp(flat, axis=0), flat[between]
-    above = found.max(axis=0) > ends.max(axis=0) + noticed
-    below = found.min(axis=0) < ends.min(axis=0) - noticed
-    places = np.append(found.argmax(axis=0)[above], found.argmin(axis=0)[below])
-    return np.asarray(times[between[places]])
+    return np.unique([time for one in series for time in np.asarray(one.times, dtype=float)])
 
 
 def single_motions(motion: MotionLaw) -> tuple[MotionLaw, ...]:

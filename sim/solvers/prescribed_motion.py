@@ -1,6 +1,7 @@
 """Prescribes the motion of units, or the forces on them."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
 import jax
@@ -13,13 +14,18 @@ from sim.energy import Topology
 from sim.solvers.loads import (
     DISPLACEMENT,
     FORCE,
+    FREE,
     MotionLaw,
     Superposition,
     held_selection,
     loaded_units,
     selected,
+    series_times,
 )
 from sim.structure import ConcreteParameters
+
+PEAK = 1e-2
+"""Part of the largest change up to which a peak of a series is noise."""
 
 
 class PrescribedMotion(NamedTuple):
@@ -63,6 +69,52 @@ class PrescribedMotion(NamedTuple):
             return np.zeros(shape)
         each = np.broadcast_to(self._at(times).reshape(len(times), -1, 3), shape)
         return np.where(self.control == FORCE, each, 0.0)
+
+    def passed_peaks(self, times: Floats, arm: float) -> list[Floats]:
+        """Finds where series go beyond what they are at two output times, between these.
+
+        Args:
+            times: (n_times,) of the outputs, s; the first comes after rest at zero.
+            arm: by which rotations and moments compare with displacements and forces, mm.
+
+        Returns:
+            times of the largest and the smallest value of each component in the interval before
+            each output, in the order in which they are passed; none that exceeds both ends by less
+            than PEAK of the largest change of any component.
+        """
+        given = series_times(self.motion)
+        if len(given) == 0:
+            return [given] * len(times)
+        at, ends = self._acting(given, arm), self._acting(np.append(0.0, times), arm)
+        least, found = PEAK * self._largest_changes(at), []
+        for k, (start, end) in enumerate(pairwise([0.0, *times.tolist()])):
+            inner = (given > min(start, end)) & (given < max(start, end))
+            inside, peaks = at[inner], np.zeros(0, dtype=np.int64)
+            if inner.any():
+                above = inside.max(axis=0) > ends[k : k + 2].max(axis=0) + least
+                below = inside.min(axis=0) < ends[k : k + 2].min(axis=0) - least
+                peaks = np.append(inside.argmax(axis=0)[above], inside.argmin(axis=0)[below])
+            found.append(given[inner][np.unique(peaks)[:: 1 if end >= start else -1]])
+        return found
+
+    def _acting(self, times: Floats, arm: float) -> Floats:
+        """Computes what acts (n_times, n, 3), rotations and moments in the others' units."""
+        each = self._at(times).reshape(len(times), -1, 3)
+        each = each if self.control is None else np.where(self.control == FREE, 0.0, each)
+        forced = False if self.control is None else (self.control == FORCE)[..., 2]
+        scales = np.ones(each.shape[1:])
+        scales[:, 2] = np.where(forced, 1.0 / arm, arm)
+        return np.asarray(each * scales)
+
+    def _largest_changes(self, acting: Floats) -> Floats:
+        """Measures the largest range of displacements, and of forces, for each component (n, 3)."""
+        ranges = np.ptp(acting, axis=0)
+        if self.control is None:
+            return np.full_like(ranges, ranges.max())
+        found = np.zeros_like(ranges)
+        for kind in (DISPLACEMENT, FORCE):
+            found[self.control == kind] = ranges[self.control == kind].max(initial=0.0)
+        return found
 
     def resistance(self, values: ConcreteParameters, times: Floats) -> Floats:
         """Forces (n_times, n, 3) that accelerate and damp its units where it displaces them.

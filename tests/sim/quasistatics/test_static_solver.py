@@ -173,6 +173,32 @@ def test_the_peak_of_a_cycle_between_output_loads_is_passed(substeps: int) -> No
     assert 2.0 > found.snapped[1] > 1.0
 
 
+def recorded(times: Floats, depth: Floats, noise: float = 0.0) -> Rig:
+    """Squares of which one side follows a recorded motion (n_times,), mm, with noise in all dofs."""
+    scales = noise * np.array([1.0, 1.0, 1.0 / 7.5])
+    motion = np.random.default_rng(0).normal(scale=scales, size=(len(times), 3))
+    motion[:, 0] -= depth
+    return replace(squeezed(6.0), motion=TimeSeries(times, motion - motion[0]))
+
+
+def test_noise_of_a_recorded_ramp_has_no_peaks() -> None:
+    times, outputs = np.linspace(0.0, 1.0, 501), np.linspace(0.05, 1.0, 20)
+    rig = recorded(times, 6.0 * times, noise=0.006)
+    assert not np.concatenate(rig.drive.passed_peaks(outputs, 7.5)).size
+    there_and_back = recorded(times, 6.0 * np.sin(np.pi * times), noise=0.006)
+    (peak,) = np.concatenate(there_and_back.drive.passed_peaks(np.array([0.3, 0.8]), 7.5))
+    assert peak == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_known_path_serves_between_loads_without_a_peak() -> None:
+    times, outputs = np.linspace(0.0, 1.0, 101), np.linspace(0.1, 1.0, 10)
+    rig = recorded(times, 6.0 * np.minimum(times / 0.75, 4.0 * (1.0 - times)))
+    cold = StaticSolver(rig.topology, outputs).forward(rig.values, rig.drive)[2]
+    warm = StaticSolver(rig.topology, outputs, start=cold).forward(rig.values, rig.drive)[2]
+    np.testing.assert_allclose(warm.states, cold.states, rtol=0, atol=1e-8)
+    assert warm.counts[1] < 0.7 * cold.counts[1]
+
+
 def test_a_path_known_from_a_similar_structure_saves_work_and_changes_nothing() -> None:
     rig, loads = squeezed(9.0), np.linspace(0.1, 1.0, 10)
     shifts = np.random.default_rng(0).uniform(-0.3, 0.3, rig.space.n_variables)
