@@ -18,7 +18,7 @@ WEAK_FROM, NOTHING_FROM = 0.1, 1.0
 ILL_CONDITIONED = 30.0
 """Condition number from which constants are hardly told apart."""
 CONVERGED = 0.05
-FREQUENCY_RATIO = 1.25
+MOST_FREQUENCY_RATIO = 1.25
 """Ratio of a trace's frequency to that of the law of its damping, up to which both swing alike."""
 _NORMAL_FREEDOM = 1e6
 """Freedom from which Student's distribution is the normal one."""
@@ -201,7 +201,7 @@ def _decay_warnings(fit: Fit, k: int) -> list[str]:
     if not isinstance(experiment, DecayTest):
         return []
     ratio, measured = experiment.frequency_ratio(here), experiment.peaks.frequency / (2 * np.pi)
-    if 1 / FREQUENCY_RATIO <= ratio <= FREQUENCY_RATIO:
+    if 1 / MOST_FREQUENCY_RATIO <= ratio <= MOST_FREQUENCY_RATIO:
         return []
     return [
         f"{experiment.measured.name}: the trace swings at {measured:.3g} Hz, where one unit on one"

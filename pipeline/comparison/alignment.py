@@ -1,6 +1,6 @@
 """Aligns measurement and simulation in time or load by the drive alone.
 
-A motion in time is aligned by the cross-correlation of the measured and the nominal course of the
+A motion in time is aligned by the cross-correlation of the measured and the nominal history of the
 driven units, to a fraction of a frame. A quasi-static one has no time: equal displacement of the
 driven units is equal load, on the way there and back.
 """
@@ -20,12 +20,12 @@ LEAST_FRAMES = 8
 LEAST_CORRELATION = 0.9
 MOTION, LOADING, UNLOADING = range(3)
 
-_LEAST_OVERLAP = 0.5  # of the shorter course
+_LEAST_OVERLAP = 0.5  # of the shorter history
 _LAGS_PER_FRAME = 2  # lags tried
 _REFINEMENTS = 12  # pairs of golden sections
 _CORRELATION_MARGIN = 0.1  # of the correlation: lags that a finer look may find to be the best
 _VARIANCES = 9.0  # times the variance, what three standard deviations add: a lag as good
-_SAME = 1e-4  # of the mean square: courses that differ by less are the same
+_SAME = 1e-4  # of the mean square: histories that differ by less are the same
 _END_MARGIN = 0.005  # of the nominal range: still its end
 _LEAST_RANGE = 0.05  # of the nominal range: a drive that moves
 _OVERSAMPLING = 20  # samples of a path that is inverted, for each of its own
@@ -37,7 +37,7 @@ class Lag(NamedTuple):
 
     value: float  # s
     sigma: float  # its standard uncertainty, from what the fit leaves and how that is correlated, s
-    correlation: float  # of both courses
+    correlation: float  # of both histories
     gain: float  # measured over nominal amplitude
     gain_sigma: float  # likewise
     ambiguous: bool  # whether another lag is as good, as in a steady vibration
@@ -75,10 +75,10 @@ class SampledMotion:
 
 
 def find_lag(measured: SampledMotion, nominal: SampledMotion) -> Lag:
-    """Finds the lag at which the courses agree best, up to a gain and an offset.
+    """Finds the lag at which the histories agree best, up to a gain and an offset.
 
     Raises:
-        UserError: too few frames, frames without times, or the courses agree at no lag.
+        UserError: too few frames, frames without times, or the histories agree at no lag.
     """
     seen = np.isfinite(measured.value).all(axis=1)
     held = SampledMotion(measured.time[seen], measured.value[seen])
@@ -115,7 +115,7 @@ def too_few_frames(frames: int) -> UserError:
 
 
 def _candidate_lags(measured: SampledMotion, nominal: SampledMotion) -> Floats:
-    """Lists lags (s) at which the courses overlap enough."""
+    """Lists lags (s) at which the histories overlap enough."""
     interval = float(np.median(np.diff(measured.time)))
     span, length = np.ptp(measured.time), np.ptp(nominal.time)
     least = _LEAST_OVERLAP * min(span, length)
@@ -146,7 +146,7 @@ def _search_lag(measured: SampledMotion, nominal: SampledMotion) -> tuple[float,
 def _common_samples(
     measured: SampledMotion, nominal: SampledMotion, lag: float
 ) -> tuple[Floats, Floats]:
-    """Samples both courses at the frames where both are known, less their means."""
+    """Samples both histories at the frames where both are known, less their means."""
     there = nominal.at(measured.time - lag)
     both = np.isfinite(there).all(axis=1)
     first, last = measured.value[both], there[both]
@@ -154,7 +154,7 @@ def _common_samples(
 
 
 def _correlation(measured: SampledMotion, nominal: SampledMotion, lag: float) -> float:
-    """Correlates the courses, going through those frames alone in which the nominal one moves."""
+    """Correlates the histories, going through those frames alone in which the nominal one moves."""
     ends = nominal.time[[0, -1]]
     first, n = np.searchsorted(measured.time, lag + ends, side="right")
     if n == 0:
@@ -194,7 +194,7 @@ def _fit(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[f
 
 
 def _residual(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[Floats, float]:
-    """Computes what a gain on the nominal course leaves (frames, channels), and the gain."""
+    """Computes what a gain on the nominal history leaves (frames, channels), and the gain."""
     first, last = _common_samples(measured, nominal, lag)
     gain = float(np.sum(first * last) / np.sum(last**2))
     return first - gain * last, gain
@@ -213,38 +213,38 @@ def find_load_time(measured: Floats, nominal: SampledMotion) -> Floats:
 
     Args:
         measured: (frames,) displacement of the driven units along the drive, mm.
-        nominal: its course, one channel that only grows.
+        nominal: its history, one channel that only grows.
 
     Raises:
         UserError: too few frames, a drive that goes to and fro, or one that hardly moves.
     """
-    course = nominal.value[:, 0]
-    if (np.diff(course) <= 0).any():
+    history = nominal.value[:, 0]
+    if (np.diff(history) <= 0).any():
         remedy = "compare under a ramp: give the problem a drive of that kind"
         raise UserError("a quasi-static drive to and fro has no load axis", remedy=remedy)
     if (seen := int(np.isfinite(measured).sum())) < LEAST_FRAMES:
         raise too_few_frames(seen)
-    span = float(np.ptp(course))
-    if (reached := float(np.nanmax(measured) - course[0])) < _LEAST_RANGE * span:
+    span = float(np.ptp(history))
+    if (reached := float(np.nanmax(measured) - history[0])) < _LEAST_RANGE * span:
         raise UserError(
             f"the drive cannot be aligned: the driven units move by {reached:.3g} mm along the"
             f" drive's direction, where the problem moves them by {span:.3g} mm",
             remedy="check `turned` and `mirrored` of the recording, and its window",
         )
     margin = _END_MARGIN * span
-    inside = (measured >= course[0] - margin) & (measured <= course[-1] + margin)
-    dense = np.linspace(nominal.time[0], nominal.time[-1], _OVERSAMPLING * len(course))
+    inside = (measured >= history[0] - margin) & (measured <= history[-1] + margin)
+    dense = np.linspace(nominal.time[0], nominal.time[-1], _OVERSAMPLING * len(history))
     finer = np.maximum.accumulate(nominal.at(dense)[:, 0])
     return np.where(inside, np.interp(measured, finer, dense), np.nan)
 
 
 def find_branches(measured: Floats) -> NDArray[np.int8]:
     """Classifies load (frames,) as growing or falling; at rest, as before."""
-    course = _fill_gaps(measured)
-    width = max(len(course) // 40, 1)
+    history = _fill_gaps(measured)
+    width = max(len(history) // 40, 1)
     kernel = np.ones(2 * width + 1) / (2 * width + 1)
-    speed = np.convolve(np.gradient(np.pad(course, 2 * width, mode="edge")), kernel, mode="same")
-    speed = speed[2 * width : 2 * width + len(course)]
+    speed = np.convolve(np.gradient(np.pad(history, 2 * width, mode="edge")), kernel, mode="same")
+    speed = speed[2 * width : 2 * width + len(history)]
     way = np.where(np.abs(speed) < _SPEED_SHARE * np.abs(speed).mean(), 0.0, np.sign(speed))
     last = np.maximum.accumulate(np.where(way != 0, np.arange(len(way)), 0))
     return np.where(way[last] < 0, UNLOADING, LOADING).astype(np.int8)

@@ -213,7 +213,7 @@ def _structure(clip: AnimationClip, pad: float) -> dict[str, Any]:
         "arm": encoded(arm, "<f4"),
         "owner": encoded(np.nonzero(present)[0], "<i4"),
         "ligaments": encoded(ends, "<i4"),
-        "pads": [ring.round(3).tolist() for ring in pads(structure, pad)],
+        "pads": [[ring.round(3).tolist() for ring in rings] for rings in pads(structure, pad)],
         "driven": np.flatnonzero(structure.support == DRIVEN).tolist(),
         "marker": clip.marker,
     }

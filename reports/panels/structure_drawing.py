@@ -13,7 +13,8 @@ from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, FancyArrowPatch, Polygon, Rectangle
+from matplotlib.patches import Circle, FancyArrowPatch, PathPatch, Rectangle
+from matplotlib.path import Path
 
 from reports.base import GREY, INTACT, PALE, style
 from reports.study import CLAMPED, RigidUnits, deformed
@@ -105,20 +106,27 @@ def draw_clamps(axes: Axes, structure: RigidUnits, pad: float) -> None:
         for x, y in corners:
             axes.add_patch(Rectangle((x, y), pad, pad, **look))
         return
-    for ring in pads(structure, pad):
-        axes.add_patch(Polygon(ring, **look))
+    for rings in pads(structure, pad):
+        outline = Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
+        axes.add_patch(PathPatch(outline, **look))
 
 
-def pads(structure: RigidUnits, pad: float) -> list[Floats]:
-    """Returns outlines (n, 2) of the pads under clamped units; those that overlap are joined."""
+def pads(structure: RigidUnits, pad: float) -> list[list[Floats]]:
+    """Returns outlines (n, 2) of the pads under clamped units, and of holes in each.
+
+    Those that overlap are joined.
+    """
     corners = structure.centroid[structure.support == CLAMPED] - pad / 2
     squares = shapely.box(*corners.T, *(corners + pad).T)
     if not _overlap(corners, pad):
-        return [shapely.get_coordinates(square) for square in squares]
+        return [[shapely.get_coordinates(square)] for square in squares]
     joined = shapely.union_all(squares)
     for reach in (0.1 * pad, -0.1 * pad):  # closes slits between them
         joined = joined.buffer(reach, join_style="mitre")
-    return [shapely.get_coordinates(part.exterior) for part in shapely.get_parts(joined)]
+    return [
+        [shapely.get_coordinates(ring) for ring in (part.exterior, *part.interiors)]
+        for part in shapely.get_parts(joined)
+    ]
 
 
 def _overlap(corners: Floats, side: float) -> bool:

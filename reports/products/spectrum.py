@@ -159,5 +159,5 @@ def bands_panel(axes: Axes, data: xr.Dataset, points: tuple[str, ...]) -> None:
 
 def _band_colours(count: int) -> Sequence[str]:
     """Returns a colour for each compression: none that stands for another structure elsewhere."""
-    paler = (to_hex(style.MAGNITUDE(place)) for place in np.linspace(0.7, 0.25, count - 1))
+    paler = (to_hex(style.MAGNITUDE(place)) for place in np.linspace(0.7, 0.25, max(count - 1, 0)))
     return [style.INTACT, *paler][:count]

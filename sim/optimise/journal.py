@@ -108,7 +108,7 @@ class Journal:
         With them comes back the state in which the evaluation, or its failure, left ``holder``.
         """
 
-        def replayed(x: Floats) -> tuple[float, Floats, Floats]:
+        def evaluate_or_replay(x: Floats) -> tuple[float, Floats, Floats]:
             start = self._opened.tell()
             payload = self._read()
             if payload is not None and _design(payload) == x.tobytes():
@@ -121,7 +121,7 @@ class Journal:
                 self._truncate(start)
             return self._compute(evaluate, x, holder)
 
-        return replayed
+        return evaluate_or_replay
 
     @property
     def _opened(self) -> BinaryIO:

@@ -238,7 +238,7 @@ class _InteriorPoint:
 def _saddle(
     diagonal: Floats, matrix: sp.csr_array, compliance: Floats, right_x: Floats, right_p: Floats
 ) -> tuple[Floats, Floats]:
-    """Solves diagonal dx + matrix^T dp = push and matrix dx - give dp = pull."""
+    """Solves diagonal dx + matrix^T dp = right_x and matrix dx - compliance dp = right_p."""
     if matrix.shape[0] < matrix.shape[1]:
         scaled = _with_entries(matrix, matrix.data * (1 / diagonal)[matrix.indices])
         schur = (scaled @ matrix.T).toarray() + np.diag(compliance)

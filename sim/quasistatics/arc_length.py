@@ -234,9 +234,9 @@ class ArcLengthPath:
     def tangent_at(self, point: PathPoint) -> Tangent | None:
         """Factorises the tangent at a point; None if it is singular."""
         if self._last is None or self._last[0] is not point:
-            held_rate, along = self.held_rate(point), np.empty_like(point.state)
+            held_direction, along = self.held_direction(point), np.empty_like(point.state)
             locate(point.state, self.system, self._work.kinematics)
-            hessian_product(point.state, self.system, self._work.kinematics, held_rate, along)
+            hessian_product(point.state, self.system, self._work.kinematics, held_direction, along)
             try:
                 found = Tangent(self.stiffness(point), along[self.free] / self.scale)
             except RuntimeError:
@@ -244,7 +244,7 @@ class ArcLengthPath:
             self._last = point, found
         return self._last[1]
 
-    def held_rate(self, point: PathPoint) -> Floats:
+    def held_direction(self, point: PathPoint) -> Floats:
         """Computes the unit direction (n_dofs,) in which the drive moves the held dofs."""
         found = np.zeros_like(point.state)
         found[self._held], load_scale = self._rates(point.load)

@@ -129,8 +129,8 @@ def _slopes(
     mode = np.zeros_like(state)
     mode[free] = soft.mode / path.scale
     bars, bar = mode_slopes(topology, system, state, mode)
-    held_rate = path.held_rate(soft.point)
-    right = np.append(bar[free] / path.scale, bar @ held_rate)
+    held_direction = path.held_direction(soft.point)
+    right = np.append(bar[free] / path.scale, bar @ held_direction)
     tangent = path.tangent_at(soft.point)
     if tangent is None:
         raise SimulationError("the tangent is singular at the softest point of a path")

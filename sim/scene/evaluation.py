@@ -105,7 +105,7 @@ class GradientChain:
 
 
 def _slopes(computed: Array) -> Floats:
-    """Replaces slopes that are not finite by zero: a root has none at zero."""
+    """Replaces slopes that are no number by zero: a root has none at zero."""
     slopes = np.asarray(computed)
     return np.where(np.isnan(slopes), 0.0, slopes)
 

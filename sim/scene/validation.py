@@ -278,7 +278,7 @@ def _check_start(
 ) -> Iterator[str]:
     """Refuses displacements, or forces, that do not start at zero; warns of small ones.
 
-    The course (n_times, n_driven, 3) has both; either is measured by its own largest value.
+    The history (n_times, n_driven, 3) has both; either is measured by its own largest value.
     """
     size, arm = np.abs(history).max(axis=0), scene.lattice.spacing / 2
     sizes = np.abs(np.where(size > ACROSS_TOLERANCE * size.max(initial=0.0), history, 0.0))
@@ -298,7 +298,7 @@ def _check_start(
 
 
 def _check_clamped(scene: Scene, drive: PrescribedMotion, history: Floats, case: str) -> None:
-    """Refuses motions and forces, in the course (n_times, n_driven, 3), of what is clamped."""
+    """Refuses motions and forces, in the history (n_times, n_driven, 3), of what is clamped."""
     size = np.abs(history).max(axis=0)
     acts = np.broadcast_to(size > ACROSS_TOLERANCE * size.max(initial=0.0), (len(drive.units), 3))
     if drive.control is not None:

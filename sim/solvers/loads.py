@@ -41,7 +41,7 @@ def _along(direction: float | Array, displacement: Numbers) -> Numbers:
 
 
 class Turning(NamedTuple):
-    """Turns by the course of a motion along x, its displacement in mm read as an angle in rad.
+    """Turns by the history of a motion along x, its displacement in mm read as an angle in rad.
 
     Of a force, in N, it makes a moment, in N mm.
     """

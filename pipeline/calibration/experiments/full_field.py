@@ -49,7 +49,7 @@ COARSE_WARNING = (
 class FullFieldExperiment:
     """Holds a track as an experiment (``experiment.Experiment``)."""
 
-    measured: MeasuredValues  # displacements of the free units, course by course; then the load
+    measured: MeasuredValues  # displacements of the free units, history by history; then the load
     simulation: SpecimenSimulation  # of the specimen under the measured motion of the held units
     depends_on: tuple[ConstantName, ...]  # the constants that the motion depends on
     changes: tuple[DriveChange, ...]  # by one standard deviation of that motion's noise each
@@ -184,7 +184,7 @@ def _refuse_other_contact(scene: Scene, begin: Constants, path: Path) -> None:
 
 
 def _select_values(track: xr.Dataset, driven: Scene) -> Ints:
-    """Selects (n, 3) place of the unit, dof, frame: free, well seen, course by course.
+    """Selects (n, 3) place of the unit, dof, frame: free, well seen, history by history.
 
     The first frame is the reference of all others: by definition nothing has moved.
     """

@@ -271,6 +271,8 @@ def _kerf_step(settings: Fabrication) -> list[str]:
     kerf, hung = f"{settings.laser.kerf:g}", ""
     if settings.shims.tabs is not None:
         hung = f" Of shims, which hang on tabs, cut those _kerf{kerf} on any cutter."
+    if not settings.laser_cuts_units:
+        hung += " Those of the units and the coupon are for reference."
     return [
         f"Cut either the drawings _nominal or those _kerf{kerf}, never both: the second ones make "
         f"good a cut {kerf} mm wide, the first are for a cutter that does so itself.{hung}"

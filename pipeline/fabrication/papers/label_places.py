@@ -16,6 +16,7 @@ _ID, _SMALLEST = 6.5, 5.0  # points; on units too small for that an id reaches b
 _ASPECT = 0.75  # a letter's width to its size, with some room
 _STEP = 0.25  # mm between places that are tried for an id
 _STROKE = 0.2  # mm on both sides of a shim's line
+_AT_ONCE = 64  # places that are tried, from the nearest on
 _OUTSIDE = 5.0  # mm^-2 for what of an id is not on its unit
 _DISTANCES = np.array([1.8, 2.4, 3.0, 3.7, 4.5, 5.5, 6.5, 8.0])  # mm from the shim's middle
 _TURNS = np.deg2rad(np.arange(0.0, 360.0, 15.0) + 45.0)
@@ -83,11 +84,16 @@ def _clear_place(
     inside = shapely.contains_xy(outline, x, y)
     x, y = np.append(x[inside], widest[0]), np.append(y[inside], widest[1])
     half, _, _, up = name_box(name, (0.0, 0.0, _SMALLEST))
-    boxes = shapely.box(x + half, y - up, x - half, y + up)
-    covered = shapely.area(shapely.intersection(boxes, others))
-    outside = shapely.area(shapely.difference(boxes, outline))
     away = np.hypot(x - widest[0], y - widest[1])
-    best = int(np.argmin(np.round(away + _COVERED * covered + _OUTSIDE * outside, 6)))
+    cost = np.full(len(x), np.inf)
+    for near in np.array_split(np.argsort(away, kind="stable"), -(-len(x) // _AT_ONCE)):
+        if np.round(away[near[0]], 6) > cost.min():  # nothing farther costs less
+            break
+        boxes = shapely.box(x[near] + half, y[near] - up, x[near] - half, y[near] + up)
+        covered = shapely.area(shapely.intersection(boxes, others))
+        outside = shapely.area(shapely.difference(boxes, outline))
+        cost[near] = np.round(away[near] + _COVERED * covered + _OUTSIDE * outside, 6)
+    best = int(np.argmin(cost))
     return float(x[best]), float(y[best]), _SMALLEST
 
 

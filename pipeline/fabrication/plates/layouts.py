@@ -66,7 +66,7 @@ def compensated(part: FlatPart, kerf: float, file: str) -> FlatPart:
         what = f"a kerf of {kerf:g} mm closes {closed} of part {part.id}"
         remedy = "lower it, or raise fabrication.slots.clearance and those of fabrication.coupon"
         remedy += "; with a smaller fabrication.laser.aspect_ratio units are printed only"
-        if np.isinf(part.slot):  # a template's holes, a comb's teeth
+        if part.holes and np.isinf(part.slot):  # of the template
             remedy = "lower it, or ask for larger dots (fabrication.markers.diameter)"
         raise UserError(what, file=file, key="fabrication.laser.kerf", remedy=remedy)
     outline = shapely.orient_polygons(grown.simplify(_SHORT))

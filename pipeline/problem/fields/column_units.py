@@ -99,15 +99,15 @@ def _spelled(word: str, dimension: units.Dimension) -> str | None:
     if not (word.isalpha() and 1 < len(word) <= _LONGEST_CAPITALS):
         return None
     spellings = {"".join(each) for each in product(*((c.lower(), c.upper()) for c in word))}
-    fitting = [each for each in spellings if _fits(each, dimension)]
+    fitting = [each for each in spellings if _fits(each, dimension, misspelt=False)]
     return fitting[0] if len(fitting) == 1 else None
 
 
-def _fits(word: str, dimension: units.Dimension) -> bool:
+def _fits(word: str, dimension: units.Dimension, *, misspelt: bool = True) -> bool:
     try:
         units.parse_quantity(f"1 {word}", dimension)
     except units.MisspeltUnitError:
-        return True
+        return misspelt
     except UserError:
         return False
     return True

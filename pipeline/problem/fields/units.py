@@ -62,7 +62,7 @@ _UNIT = rf"(?P<unit>{_POWER}(?:\s*[*·/ ]\s*{_POWER})*)"
 _QUANTITY = re.compile(rf"\s*{_NUMBER}\s*(?:{_UNIT}|(?P<rest>\S.*?))?\s*")
 _MISSPELT = re.compile(
     r"(?<![A-Za-z\u00b5\u03bc])(?:[MG](?:m|s|sec|rad|deg)|mPa)(?![A-Za-z])"
-    r"|^[MG]N(?!\s*/|.*-)"
+    r"|(?<![A-Za-z/])[MG]N(?![A-Za-z]|\s*/|.*-)"
 )
 """Units that nobody in this field measures in, of which another spelling is one: mm, mN, MPa.
 

@@ -152,8 +152,8 @@ class Laser(Section):
     """Sheets for the laser cutter.
 
     Attributes:
-        kerf: width of the cut; the drawings are also written without compensation. Those of units
-            that are printed only, for reference, are so alone.
+        kerf: width of the cut; the drawings are also written without compensation. Units that are
+            printed only are drawn without it alone, for reference.
         sheet: width and height of a sheet.
         margin: free rim of a sheet.
         gap: smallest distance of two parts.

@@ -21,7 +21,7 @@ from sim.core import Floats, Ints, Mask
 
 _LEAST_MATCHES = 6
 _ANGLE_BINS = 72
-_LOG_SIZE = 0.3
+_LARGEST_LOG_RATIO = 0.3
 """Logarithm of the size of a pair of neighbours over that of joined units, at most."""
 _MOST_JOINTS = 64
 _BIN_WIDTH, _NEAR, _GATE = 0.25, 0.3, 0.35
@@ -35,7 +35,7 @@ _EQUIVALENT = 0.95
 """Matches of further seeds, over those of the best, where more than usual are asked for."""
 _SUFFICIENT = 0.98
 """Score, over the number of units, after which no other shift is tried."""
-_NEAREST, _RIDGE = 8, 0.05
+_NEIGHBOURS, _RIDGE = 8, 0.05
 _ROUNDS = 80
 _FARTHEST, _NEAREST_DISTANCE = 1.55, 0.6
 """Distance of neighbours, diagonal ones too, between these, pitches."""
@@ -142,7 +142,7 @@ def _vote_factors(
     seen = seen[np.abs(seen) > 0.6 * pitch]
     few = vectors[:: -(-len(vectors) // _MOST_JOINTS)]
     ratio = (seen[:, None] / np.concatenate([few, -few])).ravel()
-    ratio = ratio[np.abs(np.log(np.abs(ratio) / scale)) < _LOG_SIZE]
+    ratio = ratio[np.abs(np.log(np.abs(ratio) / scale)) < _LARGEST_LOG_RATIO]
     ratio = ratio[np.abs(np.angle(ratio)) <= most_turn]
     if not len(ratio):
         return
@@ -287,7 +287,7 @@ class _Growth:
         """Extrapolates places (units, 2) from other matches; gives distances of the nearest too."""
         known = np.flatnonzero(self._patch >= 0)
         off = self._patches[self._patch[known]] - self._linear[known]
-        count = min(_NEAREST + 1, len(known))
+        count = min(_NEIGHBOURS + 1, len(known))
         far, near = cKDTree(self._points[known]).query(self._points, k=count)
         other = known[near] != np.arange(len(self._points))[:, None]
         offset = (self._points[known][near] - self._points[:, None]) / self._reach[0]

@@ -101,6 +101,6 @@ def write_drawing(picture: np.ndarray, path: Path) -> None:
     """
     told = PngInfo()
     told.add_text(_KEYWORD, _DRAWN)
-    drawn = fromarray(np.ascontiguousarray(picture[..., ::-1]))
+    drawn = fromarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB))
     with write_atomically(path) as aside:
         drawn.save(aside, "PNG", pnginfo=told, compress_level=_QUICK)

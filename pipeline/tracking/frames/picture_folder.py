@@ -116,7 +116,8 @@ def images(found: list[Path]) -> Iterator[Picture]:
             raise UserError("not a readable picture", file=path, remedy="write the file again")
         if path.suffix.lower() in _PAGED and (count := page_count(path)) > 1:
             what = f"there are {count} pictures in one file"
-            remedy = f"write each to a file and take {path.name} away: {_split_pages(path)}"
+            remedy = f"write each to a file, then take {path.name} away; in its folder run: "
+            remedy += _split_pages(path)
             raise UserError(what, file=path, key="video", remedy=remedy)
         yield brightness(levels, top)
 

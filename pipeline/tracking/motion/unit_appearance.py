@@ -12,7 +12,7 @@ SHARE = 0.35
 """Least part of a unit's information that a fit needs; less if photometry and place are known."""
 SHARE_KNOWN = 0.18
 
-_LAST_STEP = 0.3
+_LONGEST_LAST_STEP = 0.3
 """Last Gauss-Newton step of a fit that found its place, px."""
 _PARTLY_SEEN, _SHADED = 0.6, (0.06, 0.15)
 """Brightness of a unit that is seen as before: changes of slopes from which its fit has to be
@@ -73,7 +73,7 @@ class ReferenceAppearance:
         part = np.where(shaded < _SHADED[0], 0.5 * (1 + seen), seen)
         with np.errstate(invalid="ignore", divide="ignore"):
             fitting = fits.noise / np.abs(gain) < self._limit * part
-        settled = fits.last_step < _LAST_STEP * seen**2
+        settled = fits.last_step < _LONGEST_LAST_STEP * seen**2
         if quick is not None:
             fitting &= ~(quick & (seen < _BLURRED_SHARE))
         settled &= (seen > _PARTLY_SEEN) | (shaded < _SHADED[1])

@@ -112,7 +112,8 @@ class SnapshotLayout:
         if not plain.cramped:
             return plain
         found = plain
-        for shown in dict.fromkeys((path.shown, (path.shown[0], path.shown[-1]), path.shown[-1:])):
+        ends = tuple(dict.fromkeys((path.shown[0], path.shown[-1])))
+        for shown in dict.fromkeys((path.shown, ends, path.shown[-1:])):
             some = replace(path, shown=shown)
             found = cls._wrapped_bands(kinds, some, tallest, slim)
             if not found.cramped:
@@ -170,7 +171,7 @@ class SnapshotLayout:
     def recorded(self) -> str:
         """Tells where a recording is, seen from its simulation."""
         if self.bands > 1:
-            return "before"
+            return "left of, or in a band above,"
         return "left of" if self.beside else "above"
 
     @property

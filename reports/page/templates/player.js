@@ -81,7 +81,7 @@
   // --- the page ----------------------------------------------------------------------------
 
   const box = structures.reduce((found, { centroid, arm, owner, pads }) => {
-    const corners = pads.flat();
+    const corners = pads.flat(2);
     for (let v = 0; v < owner.length; v += 1) {
       corners.push([centroid[2 * owner[v]] + arm[2 * v], centroid[2 * owner[v] + 1] + arm[2 * v + 1]]);
     }
@@ -179,9 +179,11 @@
     pen.fillStyle = "#d4d7db";
     for (const pad of structure.pads) {
       pen.beginPath();
-      for (const [x, y] of pad) pen.lineTo(x, y);
-      pen.closePath();
-      pen.fill();
+      for (const ring of pad) {
+        ring.forEach(([x, y], k) => (k ? pen.lineTo(x, y) : pen.moveTo(x, y)));
+        pen.closePath();
+      }
+      pen.fill("evenodd");
       pen.stroke();
     }
   };

@@ -98,7 +98,7 @@ def test_a_word_that_ends_a_title_is_no_unit(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("between", ["", "CH1,CH2", "# in mm, N"])
-@pytest.mark.parametrize("told", ["um,kN", "\u00b5m,kN", "\u03bcm,KN", "(um),(kN)"])
+@pytest.mark.parametrize("told", ["um,kN", "\u00b5m,kN", "\u03bcm,KN", "(um),(kN)", "UM,KN"])
 def test_the_line_of_units_may_follow_others(between: str, told: str, tmp_path: Path) -> None:
     path = tmp_path / "readings.csv"
     path.write_text(f"displacement,force\n{between}\n{told}\n{ROWS}\n", encoding="utf-8")

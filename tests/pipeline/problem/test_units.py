@@ -51,6 +51,7 @@ def test_an_unknown_unit_is_told_the_known_ones(text: str, dimension: str) -> No
         ("1 Ms", units.TIME, "ms"),
         ("1 MN", units.FORCE, "mN"),
         ("1 MN mm", units.MOMENT, "mN"),
+        ("1 mm MN", units.MOMENT, "mN"),
         ("1 N Mm/rad", units.BENDING_STIFFNESS, "mm"),
         ("1 N/Mm", units.STIFFNESS, "mm"),
         ("1 Mrad", units.ANGLE, "mrad"),

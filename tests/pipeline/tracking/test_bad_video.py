@@ -239,7 +239,7 @@ def test_the_remedy_for_a_file_of_many_pictures_works_as_it_is_printed(
     assert cv2.imwritemulti(str(path), deep)
     with pytest.raises(UserError) as caught:
         next(read_frames(tmp_path, rate=1.0))
-    program, *words = shlex.split(str(caught.value.remedy).partition(" away: ")[2])
+    program, *words = shlex.split(str(caught.value.remedy).partition(" run: ")[2])
     assert program == sys.executable
     subprocess.run([program, *words], cwd=tmp_path, check=True)
     path.unlink()

@@ -174,7 +174,7 @@ def test_the_peak_of_a_cycle_between_output_loads_is_passed(substeps: int) -> No
 
 
 def recorded(times: Floats, depth: Floats, noise: float = 0.0) -> Rig:
-    """Squares of which one side follows a recorded motion (n_times,), mm, with noise in all dofs."""
+    """Squares of which one side follows a recorded motion, mm, with noise in all dofs."""
     scales = noise * np.array([1.0, 1.0, 1.0 / 7.5])
     motion = np.random.default_rng(0).normal(scale=scales, size=(len(times), 3))
     motion[:, 0] -= depth
