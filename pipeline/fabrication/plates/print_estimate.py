@@ -47,36 +47,23 @@ def estimate_print(parts: Iterable[PrintedPart], infill: float) -> PrintEstimate
     return PrintEstimate(*(float(sum(each)) for each in zip(*every, strict=True)))
 
 
-class _Lines(NamedTuple):
-    """Holds the perimeters of an area, which layers may share, and what is within them."""
-
-    inside: BaseGeometry
-    length: float  # of the perimeters, mm
-    seconds: float  # to print them
-
-
-def _lines(area: BaseGeometry) -> _Lines:
-    loops = list(_loops(area))
-    length = sum(float(edges.sum()) for edges, _ in loops)
-    once = sum(float(_run(edges, speed).sum()) for edges, speed in loops)
-    return _Lines(area.buffer(-PERIMETERS * PITCH, join_style="mitre"), length, once)
-
-
 def _part(part: PrintedPart, infill: float) -> PrintEstimate:
     seconds = volume = 0.0
     far = math.hypot(*part.size)
-    lines = {area: _lines(area) for area in {layer.area for layer in part.layers}}
-    large = any(_is_large(area) for each in lines.values() for area in _pieces(each.inside))
+    insides = [layer.area.buffer(-PERIMETERS * PITCH, join_style="mitre") for layer in part.layers]
+    large = any(_is_large(area) for inside in insides for area in shapely.get_parts(inside))
     surfaces = list(_surfaces(part)) if large else []
-    for layer in part.layers:
+    for layer, inside in zip(part.layers, insides, strict=True):
         count = (layer.top - layer.bottom) / LAYER
-        inside, length, once = lines[layer.area]
+        loops = list(_loops(layer.area))
+        length = sum(float(edges.sum()) for edges, _ in loops)
+        once = sum(float(_run(edges, speed).sum()) for edges, speed in loops)
         solid = sum(
             (min(layer.top, high) - max(layer.bottom, low)) * inside.intersection(area).area
             for low, high, area in surfaces
             if low < layer.top and layer.bottom < high
         )
-        for area in _pieces(inside):
+        for area in (each for each in shapely.get_parts(inside) if each.area > 0.0):
             share = 1.0
             if _is_large(area):
                 share = min(1.0, solid / (inside.area * (layer.top - layer.bottom)))
@@ -87,11 +74,6 @@ def _part(part: PrintedPart, infill: float) -> PrintEstimate:
         seconds += count * (once + pieces * (far / TRAVEL + RETRACTION))
         volume += count * length * PITCH * LAYER
     return PrintEstimate(seconds, volume / STRAND)
-
-
-def _pieces(area: BaseGeometry) -> list[Polygon]:
-    """Lists the polygons of an area."""
-    return [each for each in shapely.get_parts(area) if each.area > 0.0]
 
 
 def _is_large(area: BaseGeometry) -> bool:
@@ -112,7 +94,7 @@ def _loops(area: BaseGeometry) -> Iterator[tuple[Floats, float]]:
     """Yields the edges (n,) of the perimeters of an area, mm, with their speed."""
     for number in range(PERIMETERS):
         ring = area.buffer(-(number + 0.5) * PITCH, join_style="mitre").simplify(0.01)
-        for polygon in _pieces(ring):
+        for polygon in (each for each in shapely.get_parts(ring) if each.area > 0.0):
             for line in (polygon.exterior, *polygon.interiors):
                 edges = np.hypot(*np.diff(shapely.get_coordinates(line), axis=0).T)
                 usual = OUTER if number == 0 else INNER

@@ -294,7 +294,7 @@ def test_ids_of_narrow_units_side_by_side_do_not_cover_each_other() -> None:
 
 
 def test_an_id_stands_clear_of_shims_and_of_its_arrow() -> None:
-    """Where a triangle is widest its slots end."""
+    """Slots of a triangle end where it is widest."""
     unit = shapely.Polygon([(0.0, 0.0), (8.0, 0.0), (0.0, 9.0)])
     path, arrow = np.array([[2.5, 2.0], [2.0, 3.2]]), (0.2, 4.5, 1.0, 6.0)
     (place,) = name_places([unit], ["C7"], [path], [arrow])

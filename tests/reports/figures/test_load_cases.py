@@ -320,16 +320,6 @@ def test_curves_of_many_cases_stay_on_their_panel(two: StudyResults) -> None:
     assert low <= 0.0 < most < high
 
 
-def test_zero_has_no_sign_on_a_path_to_the_left() -> None:
-    path = replace(PATH, values=np.array([0.0, -15.0]), strain=0.1)
-    assert [path.at(0), path.at(1)] == ["0 mm (0 %)", "−15 mm (10 %)"]
-    made = Figure()
-    curves.path_axes(made.add_subplot(), path, "")
-    (above,) = made.axes[0].child_axes
-    made.draw_without_rendering()
-    assert [tick.get_text() for tick in above.get_xticklabels()] == ["0", "10"]
-
-
 def test_numbers_of_a_low_bar_of_colours_do_not_overlap(two: StudyResults) -> None:
     """Beside a single row of snapshots that are small."""
     shade = structure_panels.shade_of(two.problem, two.response)
