@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 
+import pytest
+
 from tests.e2e.checkout import Checkout, assert_plain, wait_until
 
 HEADER = struct.Struct("<4sQI")
@@ -113,6 +115,7 @@ def check_ends(moments: Iterable[str], undisturbed: Checkout, fresh: Checkout) -
     assert not fresh.jobs()
 
 
+@pytest.mark.slow
 def test_a_second_run_in_the_same_folder_is_refused(fresh: Checkout) -> None:
     """Stopped, the first run holds its study however long the second takes to begin."""
     run = fresh.start()

@@ -181,6 +181,7 @@ def test_edits_rerun_dependents(built: Sandbox, old: str, new: str, rerun: dict[
     assert built.planned("fig2") == rerun
 
 
+@pytest.mark.slow
 def test_gains_have_the_titles_of_today(built: Sandbox) -> None:
     gains = "results/fig2/gains.nc"
     ended = built.run(gains)

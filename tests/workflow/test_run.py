@@ -10,7 +10,6 @@ import pytest
 
 from pipeline.runtime import RUN_MARK
 from tests.e2e.checkout import Checkout, wait_until
-from tests.tables import some
 from tests.workflow.conftest import Sandbox
 
 DESIGN, OTHER = "results/fig2/design.nc", "results/fig4/design.nc"
@@ -78,7 +77,8 @@ def test_a_study_is_built_once_at_a_time_and_an_interrupt_leaves_no_job(sandbox:
     assert sandbox.resume(DESIGN).returncode == 0
 
 
-@pytest.mark.parametrize("ignored", some([False, True], 1))
+@pytest.mark.slow
+@pytest.mark.parametrize("ignored", [False, True])
 def test_an_interrupt_of_a_run_alone_ends_its_jobs(sandbox: Sandbox, ignored: bool) -> None:
     """As a scheduler or an editor sends it: its group may be a script's, which lives on."""
     sandbox.stage_seconds = 60.0
@@ -112,6 +112,7 @@ def test_without_a_server_stages_end_with_a_killed_run(
     assert not psutil.wait_procs(left, timeout=30)[1]
 
 
+@pytest.mark.slow
 def test_a_run_in_the_background_outlives_the_shell_that_began_it(sandbox: Sandbox) -> None:
     sandbox.stage_seconds = 60.0
     environment = sandbox.environment()

@@ -17,6 +17,7 @@ from pipeline.problem.reading import load_section
 from pipeline.runtime import ROOT
 from tests.pipeline.calibration.specimens import STIFFNESS, described, force_sets, written
 from tests.pipeline.static import MIMIC, designed, write
+from tests.tables import some
 
 VALIDATION = ROOT / "experiments/validation"
 DRAWN = (
@@ -82,11 +83,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize(
     ("part", "name"),
-    [
-        ("cycles", "morpher"),
-        ("pictures", "pictures"),
-        pytest.param("samples", "hinges", marks=pytest.mark.slow),
-    ],
+    some([("cycles", "morpher"), ("pictures", "pictures"), ("samples", "hinges")], 1),
 )
 def test_validations(part: str, name: str, read: Read, tmp_path: Path) -> None:
     out, described = tmp_path / "made.nc", VALIDATION / f"{name}.yaml"
@@ -95,6 +92,7 @@ def test_validations(part: str, name: str, read: Read, tmp_path: Path) -> None:
     assert unnamed(files - {described}, recorded(out)) == set()
 
 
+@pytest.mark.slow
 def test_calibrations(study: Path, read: Read, tmp_path: Path) -> None:
     noise = {"displacement": "0.01 mm", "rotation": "0.1 deg"}
     track = {"kind": "track", "name": "filmed", "problem": str(study), "structure": "altered"}

@@ -15,7 +15,7 @@ from pipeline.tracking.geometry import Camera
 from pipeline.tracking.motion import track_video
 from pipeline.tracking.motion.unit_appearance import HIDDEN, STRAYED
 from sim.core import Floats, Singles
-from tests.tables import refused
+from tests.tables import refused, some
 
 CLIP = ClipScript(
     pace=lambda time: 2 * np.sin(2 * np.pi * 2 * time) ** 2,
@@ -31,7 +31,7 @@ def view(pitch: float, exposure: float = 0.0) -> View:
     return View(size=(side, side), scale=pitch / 15, exposure=exposure)
 
 
-@pytest.mark.parametrize("pitch", [120, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("pitch", some([60, 120], 1))
 def test_quick_motions_are_followed_however_fine_pictures_are(pitch: int, tmp_path: Path) -> None:
     clip = film_clip(CLIP._replace(view=view(pitch)), tmp_path / "unused.mkv")
     found = errors(clip, track_clip(clip))
