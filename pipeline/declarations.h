@@ -56,7 +56,7 @@ typedef struct {
     int64_t n_drift;
 } FitStart;
 
-void coverage_accumulate(double *points, int64_t *start, double *shade, double *change, int64_t columns, int64_t n_shade, int64_t n_change);
+void coverage_integrate(double *points, int64_t *start, double *shade, double *picture, int64_t columns, int64_t n_shade, int64_t n_picture);
 void patch_correlation_fit_patches(const FramePixels *scene, const Templates *templates, const FitStart *start, bool *chosen, int64_t size, int64_t steps, double *out, int64_t n_chosen);
 void template_cells_classify(float *brightness, float *weight, double contrast, double noise, uint8_t *kind, int64_t *span, int64_t n_span);
 void template_cells_unfold(float *brightness, float *weight, int64_t *span, float *nodes, int64_t n_span);

@@ -39,15 +39,17 @@ static void add_edge(
     }
 }
 
-void coverage_accumulate(
-    double *points, int64_t *start, double *shade, double *change, int64_t columns,
-    int64_t n_shade, int64_t n_change) {
+void coverage_integrate(
+    double *points, int64_t *start, double *shade, double *picture, int64_t columns,
+    int64_t n_shade, int64_t n_picture) {
     for (int64_t ring = 0; ring < n_shade; ring++) {
         int64_t first = start[ring], end = start[ring + 1];
         for (int64_t k = first; k < end; k++) {
             int64_t following = k + 1 < end ? k + 1 : first;
             add_edge(
-                points + 2 * k, points + 2 * following, shade[ring], change, n_change, columns);
+                points + 2 * k, points + 2 * following, shade[ring], picture, n_picture, columns);
         }
     }
+    for (int64_t row = 0; row < n_picture; row++)
+        for (int64_t k = columns * row + 1; k < columns * (row + 1); k++) picture[k] += picture[k - 1];
 }

@@ -36,20 +36,20 @@ def mean_polygons(pictures: Sequence[NestedPolygons]) -> NestedPolygons:
 
 def coverage_image(rings: NestedPolygons, shape: tuple[int, int]) -> Floats:
     """Averages the shade (rows, columns) over each pixel; pixel (0, 0) reaches from -0.5 to 0.5."""
-    change = np.zeros((shape[0], shape[1] + 2))
+    picture = np.zeros((shape[0], shape[1] + 2))
     points = np.ascontiguousarray(rings.points + 0.5)
-    _accumulate(points, rings.start, rings.shade, change, change.shape[1])
-    return np.cumsum(change, axis=1, out=change)[:, : shape[1]]
+    _integrate(points, rings.start, rings.shade, picture, picture.shape[1])
+    return picture[:, : shape[1]]
 
 
 @compiled
-def _accumulate(
+def _integrate(
     points: Floats,
     start: Ints,
     shade: Floats,
-    change: Floats,
+    picture: Floats,
     columns: int,
     n_shade: int = 0,
-    n_change: int = 0,
+    n_picture: int = 0,
 ) -> None:
-    """Adds what each edge changes (rows, columns) from one pixel of a row to the next."""
+    """Sums what each edge changes (rows, columns) from one pixel of a row to the next."""

@@ -19,6 +19,7 @@ from sim.core import Floats, Ints
 
 _PIECE = 2.0  # longest piece of an edge, mm: the lens bends edges
 _CORNERS = 32  # of a disc
+_FLAT = 1e-12  # part of its hull's area that a convex unit may lack: rounding
 
 
 class FilmScene(NamedTuple):
@@ -46,7 +47,7 @@ def nested_polygons(scene: FilmScene, pose: Floats) -> NestedPolygons:
     corners = _move_points(
         scene.specimen.outline, np.arange(len(pose)), pose, scene.specimen.centre
     )
-    faces = np.array([shapely.Polygon(each[~np.isnan(each[:, 0])]) for each in corners])
+    faces = _polygons(corners)
     layers = [
         _layer(_project_sides(scene, faces, corners), appearance.side - appearance.board),
         _layer(faces, appearance.face - appearance.side),
@@ -68,28 +69,42 @@ def _move_points(points: Floats, unit: Ints, pose: Floats, centre: Floats) -> Fl
     return np.asarray(turned + (centre + pose[:, :2])[unit, None])
 
 
+def _polygons(corners: Floats) -> Floats:
+    """Makes polygons (n,) of their corners (n, m, 2), NaN where there are fewer than m."""
+    there = ~np.isnan(corners[..., 0])
+    return np.asarray(
+        shapely.polygons(shapely.linearrings(corners[there], indices=np.nonzero(there)[0]))
+    )
+
+
 def _project_sides(scene: FilmScene, faces: Floats, corners: Floats) -> Floats:
     """Unites faces, side walls and ligaments to one region of polygons."""
     parts = [faces]
     if depth := scene.appearance.thickness:
-        parts += _project_walls(scene, corners, depth)
+        parts = [_project_bodies(faces, corners, scene.view.behind(corners, depth))]
     if width := scene.appearance.ligament:
         end = corners[scene.ligament[..., 0], scene.ligament[..., 1]]
         parts.append(shapely.buffer(shapely.linestrings(end), width / 2, cap_style="flat"))
     return np.array([shapely.union_all(np.concatenate(parts))])
 
 
-def _project_walls(scene: FilmScene, corners: Floats, depth: float) -> list[Floats]:
-    """Projects the backs of the units and the walls below their edges on the faces' plane."""
-    back = scene.view.behind(corners, depth)
-    backs, walls = [], []
-    for front, rear in zip(corners, back, strict=True):
-        there = ~np.isnan(front[:, 0])
-        face, behind = front[there], rear[there]
-        backs.append(shapely.Polygon(behind))
-        sides = [face, np.roll(face, -1, axis=0), np.roll(behind, -1, axis=0), behind]
-        walls.append(np.stack(sides, axis=1))  # (edges, 4, 2) corners of the wall below every edge
-    return [np.array(backs), shapely.convex_hull(shapely.multipoints(np.concatenate(walls)))]
+def _project_bodies(faces: Floats, corners: Floats, back: Floats) -> Floats:
+    """Unites each unit's face with its back and with the walls between them on the faces' plane.
+
+    Of a convex unit these are the hull of both ends: its back is its face, moved and scaled.
+    """
+    backs = _polygons(back)
+    bodies = np.asarray(
+        shapely.convex_hull(shapely.geometrycollections(np.stack([faces, backs], 1)))
+    )
+    convex = shapely.area(faces) > (1 - _FLAT) * shapely.area(shapely.convex_hull(faces))
+    for unit in np.flatnonzero(~convex):
+        there = ~np.isnan(corners[unit, :, 0])
+        front, rear = corners[unit, there], back[unit, there]
+        sides = [front, np.roll(front, -1, axis=0), np.roll(rear, -1, axis=0), rear]
+        walls = shapely.convex_hull(shapely.multipoints(np.stack(sides, axis=1)))
+        bodies[unit] = shapely.union_all([faces[unit], backs[unit], *walls])
+    return bodies
 
 
 def _layer(shapes: Floats, shade: float) -> _Layer:

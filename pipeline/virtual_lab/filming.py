@@ -150,14 +150,13 @@ def shade_image(scene: FilmScene, instants: Floats, blur: float) -> Floats:
     columns, rows = scene.view.camera.size
     rings = mean_polygons([nested_polygons(scene, pose) for pose in instants])
     fine = rings._replace(points=(rings.points + 0.5) * FINER - 0.5)
-    picture = coverage_image(fine, (rows * FINER, columns * FINER))
-    picture += scene.appearance.board
+    picture = coverage_image(fine, (rows * FINER, columns * FINER)).astype(np.float32)
     if blur > 0:
         edge = cv2.BORDER_REPLICATE
         blurred = cv2.GaussianBlur(picture, (0, 0), blur * FINER, borderType=edge)
-        picture = np.asarray(blurred, float)
-    in_columns = picture.reshape(rows, FINER, -1).sum(axis=1)
-    return in_columns.reshape(rows, columns, FINER).sum(axis=2) / FINER**2
+        picture = np.asarray(blurred, np.float32)
+    shades = cv2.resize(picture, (columns, rows), interpolation=cv2.INTER_AREA)
+    return scene.appearance.board + np.asarray(shades, float)
 
 
 @lru_cache(maxsize=1)
