@@ -17,7 +17,7 @@ from reports.base import Table, prose, style
 from reports.facts import headed
 from reports.page import FigureText, figure_page, publish, titled
 from reports.panels import draw
-from reports.study import draft, from_dataset, study_results
+from reports.study import display_name, draft, from_dataset, study_results
 
 _PROSE = prose(__file__)
 _FILES = ("transmission.csv", "modes.csv", "bands.csv")
@@ -75,7 +75,7 @@ def draw_spectrum(data: xr.Dataset, asked: Problem) -> Figure:
     for row, name in enumerate(names):
         top = _TOP + row * _ROW
         style.write(
-            figure, 2.0, top + _SIDE / 2, name.capitalize(), rotation=90.0, va="center",
+            figure, 2.0, top + _SIDE / 2, display_name(asked, name), rotation=90.0, va="center",
             color=style.STRUCTURE_COLOURS[name],
         )  # fmt: skip
         for mode in range(min(MODES, data.sizes["mode"])):
@@ -104,6 +104,7 @@ def _mode(axes: Axes, data: xr.Dataset, mode: int, spacing: float) -> None:
 def _transmission(axes: Axes, data: xr.Dataset, asked: Problem) -> None:
     excited = data["excitation"].values
     for name in data["structure"].values:
+        shown = display_name(asked, name).lower()
         squares = data["transmission"].sel(structure=name) ** 2
         at_rest, loaded = squares.isel(state=[0]), squares.isel(state=slice(1, None))
         drawn = [("at rest", at_rest, "-"), ("loaded", loaded, (0, (3.0, 1.5)))]
@@ -111,7 +112,7 @@ def _transmission(axes: Axes, data: xr.Dataset, asked: Problem) -> None:
             axes.plot(
                 excited, np.sqrt(curves.mean(["state", "case"])),
                 color=style.STRUCTURE_COLOURS[name], linestyle=dashes, linewidth=0.8,
-                label=f"{name}, {state}" if loaded.size else name,
+                label=f"{shown}, {state}" if loaded.size else shown,
             )  # fmt: skip
     if asked.frequency is not None and excited[0] <= asked.frequency <= excited[-1]:
         axes.axvline(asked.frequency, color=style.GREY, linewidth=0.6, linestyle=":")

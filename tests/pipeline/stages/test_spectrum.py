@@ -76,6 +76,7 @@ def test_every_load_case_has_its_equilibrium(design: Path, tmp_path: Path) -> No
     assert main(["spectrum", *drawn]) == 0
     page = (tmp_path / "index.html").read_text()
     assert "cloaked, loaded" in page
+    assert "voided, loaded" in page
     assert "Lowest modes loaded, case 0 (180 deg)" in page
 
 
