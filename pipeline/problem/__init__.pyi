@@ -11,6 +11,7 @@ from .stage_outputs import check_measured_constants as check_measured_constants
 from .stage_outputs import outputs as outputs
 from .stage_outputs import over_measured_constants as over_measured_constants
 from .unit_roles import cloak_units as cloak_units
+from .unit_roles import drive_groups as drive_groups
 from .unit_roles import driven_units as driven_units
 from .unit_roles import inclusion_units as inclusion_units
 from .unit_roles import interest_units as interest_units

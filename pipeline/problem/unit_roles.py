@@ -38,6 +38,16 @@ def driven_units(problem: Problem) -> tuple[int, ...]:
     return tuple(sorted(set().union(*every)))
 
 
+def drive_groups(problem: Problem) -> tuple[tuple[int, ...], ...]:
+    """Groups the ids of driven units that the same drives move: others move otherwise."""
+    drives = single_drives(problem.drive)
+    moved = [set(selected_units(drive.units, problem.lattice)) for drive in drives]
+    groups: dict[tuple[bool, ...], list[int]] = {}
+    for unit in driven_units(problem):
+        groups.setdefault(tuple(unit in each for each in moved), []).append(unit)
+    return tuple(map(tuple, groups.values()))
+
+
 def source_units(problem: Problem) -> tuple[int, ...]:
     """Lists the ids of driven units within the cloak: they keep their shape to fit the drive."""
     return tuple(sorted(set(driven_units(problem)) & set(_cloak_inside(problem))))

@@ -68,7 +68,11 @@ def work(args: argparse.Namespace) -> None:
             for ligament in built.ligaments
             if not np.allclose(factors[ligament.number], 1.0)
         }
-        specimen = replace(built, free_dofs=free, stiffness=other)
+        drives = tuple(
+            tuple(net.labels[n] for n in group if n in net.labels)
+            for group in problem.drive_groups(posed)
+        )
+        specimen = replace(built, free_dofs=free, stiffness=other, drives=drives)
         package = PackageFolder(room, specimen, posed, str(args.problem), bar.update)
         package.write()
         write_assembly_sheet(room / "assembly.pdf", specimen, settings)

@@ -51,8 +51,9 @@ def check_package(
     expected = expected_parts(design, structure)
     assembled = read_stl(folder / "print/assembled.stl")
     shapes = unit_sections(assembled, expected, settings)
-    letters = dict(read_manifest(folder)["letters_for_ids"])
-    record = PackageRecord(folder, expected, shapes, settings, letters)
+    manifest = read_manifest(folder)
+    told = dict(manifest["letters_for_ids"]), manifest["drives"]
+    record = PackageRecord(folder, expected, shapes, settings, *told)
     faults = list(check_assembled(assembled, record))
     done()
     for check in (check_print, check_laser, check_fixtures, check_bill, check_papers):

@@ -1,6 +1,6 @@
 """Holds a written package that is being checked, beside the parts that it has to hold."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -60,6 +60,7 @@ class PackageRecord:
     shapes: Shapes  # outlines of the units in the assembled specimen
     settings: Fabrication  # of the fabrication
     letters: Mapping[str, str]  # carried by small units instead of their ids, by id
+    drives: Sequence[Sequence[str]] = ()  # labels of driven units that move alike
 
     @cached_property
     def slots(self) -> dict[str, list[MeasuredSlot]]:

@@ -85,6 +85,9 @@ def _check_holders(parts: Mapping[str, MeshBody], record: PackageRecord) -> Iter
                 what, folder = "no part of the fixture holds it", record.folder / "fixture"
                 yield Fault(f"unit {label}", what, "fixture", BUG, folder, (shape,), shape)
     for name, base in bases.items():
+        if len(joined := _drives_on(base, record)) > 1:
+            what = f"it joins units of different drives ({joined[0]} and {joined[1]})"
+            yield parts[name].fault(what, "fixture", BUG)
         if not _is_bolted(base, settings.fixture.hole):
             what = f"it has no hole of {settings.fixture.hole:g} mm for a bolt"
             yield parts[name].fault(what, "fixture.hole")
@@ -117,6 +120,16 @@ def _base(name: str, parts: Mapping[str, MeshBody], settings: Fabrication) -> Ge
 
 def _is_on(unit: Polygon, base: Geometry) -> bool:
     return bool(base.intersection(unit).area > _LEAST_HELD * unit.area)
+
+
+def _drives_on(base: Geometry, record: PackageRecord) -> list[str]:
+    """Lists a unit that is on a base of each group of units that move alike."""
+    shapes = record.expected.polygons
+    on_it = (
+        [label for label in group if label in shapes and _is_on(shapes[label], base)]
+        for group in record.drives
+    )
+    return [labels[0] for labels in on_it if labels]
 
 
 def _is_bolted(base: Geometry, hole: float) -> bool:

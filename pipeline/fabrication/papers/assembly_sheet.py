@@ -215,9 +215,16 @@ def assembly_steps(
         clamped = ", ".join(specimen.clamped)
         steps.append(f"Set the clamped units into their pads, grips or adapters: {clamped}.")
     if specimen.driven:
-        driven = ", ".join(specimen.driven)
         room = "Where neighbours leave an adapter no room for fingers, glue it on."
-        steps.append(f"Fix the adapter or the grip of the drive to: {driven}. {room}")
+        groups = [", ".join(group) for group in specimen.drive_groups]
+        if len(groups) == 1:
+            steps.append(f"Fix the adapter or the grip of the drive to: {groups[0]}. {room}")
+        else:
+            listed = "; ".join(f"drive {n} to {labels}" for n, labels in enumerate(groups, 1))
+            steps.append(
+                "Fix the adapters or the grips of the drives, which move apart from one another: "
+                f"{listed}. {room}"
+            )
     if specimen.free_words:
         steps.append(
             f"The study leaves free {specimen.free_words}; pads, grips and adapters hold these "

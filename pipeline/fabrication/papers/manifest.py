@@ -19,6 +19,7 @@ _READ = (
     "shims",
     "laser_route",
     "prebend",
+    "drives",
     "free_dofs",
     "stiffness_factors",
     "as_built",
@@ -83,6 +84,8 @@ def write_manifest(
         "laser_route": problem.fabrication.laser_route,
         "prebend": {str(one.number): _prebend(one) for one in specimen.ligaments},
         "prebend_note": PREBEND_NOTE,
+        "drives": [list(group) for group in specimen.drive_groups],
+        "drives_note": "units that the same drives move; no part of the fixture joins others",
         "free_dofs": {label: list(dofs) for label, dofs in specimen.free_dofs.items()},
         "free_dofs_note": "of clamped and driven units in the study; the fixtures hold them all",
         "stiffness_factors": {

@@ -227,11 +227,18 @@ class BuiltSpecimen:
     shims: tuple[Shim, ...]  # in ascending order of their lengths
     clamped: tuple[str, ...] = ()  # labels of the units that fixtures hold
     driven: tuple[str, ...] = ()  # likewise
+    # labels of driven units that the same drives move, where there are several drives
+    drives: tuple[tuple[str, ...], ...] = ()
     # by label of these units: ux, uy or theta that the study leaves free; fixtures hold them all
     free_dofs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     # axial, shear and bending stiffness of simulated ligaments over those of shims, by number,
     # where they are others
     stiffness: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def drive_groups(self) -> tuple[tuple[str, ...], ...]:
+        """Driven units that may be joined to one another, by label: they move alike."""
+        return self.drives or ((self.driven,) if self.driven else ())
 
     @property
     def free_words(self) -> str:

@@ -14,7 +14,12 @@ import trimesh
 from ezdxf.filemanagement import readfile
 
 from pipeline.datasets import file_hash
-from pipeline.fabrication.checks import check_package, laser_folder, package_record
+from pipeline.fabrication.checks import (
+    check_package,
+    laser_folder,
+    package_record,
+    print_folder,
+)
 from pipeline.fabrication.checks.assembled_specimen import unit_sections
 from pipeline.fabrication.checks.bill_checks import check_bill
 from pipeline.fabrication.checks.package_record import PackageRecord, expected_parts
@@ -240,6 +245,20 @@ def test_a_package_of_other_settings_is_refused(
     with pytest.raises(UserError) as raised:
         check(whole[0], whole[1].model_copy(update={"fabrication": asked}))
     assert expected in str(raised.value)
+
+
+def test_a_bar_that_joins_units_of_different_drives_is_found(
+    whole: tuple[Path, Problem], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, settings = whole[0], whole[1].fabrication
+    parts = expected_parts(built.design(), "cloaked")
+    shapes = unit_sections(read_stl(folder / "print/assembled.stl"), parts, settings)
+    plate = shapely.union_all([*parts.polygons.values()]).convex_hull
+    monkeypatch.setattr(print_folder, "_base", lambda *_: plate)
+    for drives, told in (((("A1", "B1"),), False), ((("A1",), ("B1",)), True)):
+        record = PackageRecord(folder, parts, shapes, settings, {}, drives)
+        words = [fault.what for fault in print_folder.check_fixtures(record)]
+        assert ("it joins units of different drives (A1 and B1)" in words) is told
 
 
 def test_shims_of_other_lengths_are_found(package: Path, whole: tuple[Path, Problem]) -> None:

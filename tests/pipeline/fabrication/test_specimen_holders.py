@@ -186,6 +186,23 @@ def test_neighbours_are_held_side_by_side(
         assert one.area.distance(other.area) > 0.9
 
 
+@pytest.mark.parametrize(
+    "drives", [(("A1", "A2", "A3"), ("A4", "A5", "A6", "A7")), (("A1", "A2"), ("A3", "A4"))]
+)
+def test_no_bar_joins_units_of_different_drives(
+    lattice: tuple[Problem, BuiltSpecimen], drives: tuple[tuple[str, ...], ...]
+) -> None:
+    asked, whole = lattice
+    driven = tuple(label for group in drives for label in group)
+    specimen = replace(whole, clamped=("G1", "G2", "G3"), driven=driven, drives=drives)
+    bases, capped = plan_bases(specimen, asked.fabrication, asked.lattice.spacing)
+    assert not capped
+    held = [{unit.label for unit in base.held} for base in bases]
+    assert set().union(*held) == {*driven, *specimen.clamped}
+    for labels in held:
+        assert sum(not labels.isdisjoint(group) for group in (specimen.clamped, *drives)) == 1
+
+
 def test_all_pads_meet_one_breadboard(monkeypatch: pytest.MonkeyPatch) -> None:
     """On 5 x 8 units another shift of the board is nearer to those of a corner than of a side."""
     monkeypatch.setattr(handmade, "COLUMNS", 5)
