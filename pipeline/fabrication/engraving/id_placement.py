@@ -36,7 +36,7 @@ _HAIR = 1e-6  # mm
 _SPECK = 0.1  # mm; shorter pieces of a clipped stroke are left out
 _MOST_ARROW, _LEAST_ARROW = 1.5, 0.8  # mm
 _ARROW_KEPT = 0.9  # of an arrow that a slot cuts
-_RING = 0.3  # mm, radius
+_RING, _CLEAR = 0.3, 0.2  # mm, radius, and room to letters
 _ARROW = ("00 23 40", "20 23")  # on a grid of 4 by 3
 
 
@@ -278,15 +278,16 @@ def _box_at(size: Box, angle: float, centre: tuple[float, float]) -> Polygon:
 
 
 def orientation_mark(
-    outline: Polygon, body: Polygon, taken: BaseGeometry, settings: Labels
+    outline: Polygon, body: Polygon, placed: PlacedId, settings: Labels
 ) -> Strokes:
     """Draws an arrow to +y near the place of the id; a small ring at the upper end if no room."""
+    taken = placed.box
     for place in (outline.difference(taken), body.difference(taken)):
         for arrow in _arrows(place, taken.centroid, settings):
             kept = _clipped(arrow, outline)
             if _total_length(kept) > _ARROW_KEPT * _total_length(arrow):
                 return kept
-    return (_ring(outline),)
+    return (_ring(outline, placed),)
 
 
 def _arrows(place: BaseGeometry, near: shapely.Point, settings: Labels) -> Iterator[Strokes]:
@@ -301,10 +302,22 @@ def _arrows(place: BaseGeometry, near: shapely.Point, settings: Labels) -> Itera
                 yield transformed(scaled, 0.0, centre)
 
 
-def _ring(outline: Polygon) -> Floats:
+def _ring(outline: Polygon, placed: PlacedId) -> Floats:
+    """Draws a ring as far up as it clears the letters; across them if only there it is above."""
     inner = outline.buffer(-_RING - _MARGINS[-1])
-    room = outline.representative_point() if inner.is_empty else inner
-    points = shapely.get_coordinates(room)
+    above, below = (
+        shapely.multilinestrings([LineString(each) for each in side]).buffer(_RING + _CLEAR)
+        for side in (placed.strokes, placed.mirrored)
+    )
+    rooms = (inner.difference(above.union(below)), inner.difference(above), inner)
+    tops = [_top(room) for room in rooms if not room.is_empty]
+    upper = [top for top in tops if top[1] > outline.centroid.y]
+    top = [*upper, *tops[-1:], _top(outline.representative_point())][0]
     turn = np.linspace(0.0, 2 * np.pi, 9)
-    top = points[np.lexsort((points[:, 0], points[:, 1]))[-1]]
     return top + _RING * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+def _top(room: BaseGeometry) -> Floats:
+    """Finds the uppermost point (2,) of a region."""
+    points = shapely.get_coordinates(room)
+    return np.asarray(points[np.lexsort((points[:, 0], points[:, 1]))[-1]])

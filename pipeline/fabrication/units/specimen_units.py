@@ -94,7 +94,7 @@ def build_unit(
         remedy = "ask for larger units in the design (constraints.edge_length)"
         key = "fabrication.labels.height"
         raise UnbuildableUnitError(what, (design,), outline, file=file, key=key, remedy=remedy)
-    mark = orientation_mark(outline, body, placed.box, settings.labels)
+    mark = orientation_mark(outline, body, placed, settings.labels)
     written = (*placed.strokes, *mark)
     grown = body.area - filleted(design, settings.fillet_radius).area
     return Unit(

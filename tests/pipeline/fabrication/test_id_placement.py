@@ -4,6 +4,7 @@ import shapely
 from shapely import LineString, Polygon, box
 
 from pipeline.fabrication.engraving import orientation_mark, place_id, text_extent, text_strokes
+from pipeline.fabrication.engraving.id_placement import PlacedId
 from pipeline.fabrication.parts import column_letters, labels
 from pipeline.fabrication.units.tracking_dots import dots
 from pipeline.problem.sections import Labels, Markers
@@ -33,10 +34,20 @@ def test_underside_is_the_mirror_image_and_the_arrow_points_up() -> None:
     for top, below in zip(placed.strokes, placed.mirrored, strict=True):
         assert below[:, 1] == pytest.approx(top[:, 1])
         assert below[:, 0] == pytest.approx(20.0 - top[:, 0])
-    stem, shaft = orientation_mark(WIDE, WIDE, placed.box, Labels())
+    stem, shaft = orientation_mark(WIDE, WIDE, placed, Labels())
     assert stem[1, 1] == max(stem[:, 1]) > stem[0, 1]
     assert shaft[1] == pytest.approx(stem[1])
     assert not placed.box.intersects(LineString(stem))
+
+
+def test_a_ring_clears_the_letters_of_both_sides() -> None:
+    outline = Polygon([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)])
+    above, below = (np.array([[0.2, y], [3.8, y]]) for y in (3.7, 3.5))
+    (ring,) = orientation_mark(
+        outline, outline, PlacedId((above,), (below,), outline, 1.0), Labels()
+    )
+    assert min(LineString(ring).distance(LineString(line)) for line in (above, below)) > 0.1
+    assert ring[:, 1].min() > 2.0
 
 
 def test_dots_lie_about_the_centroid_and_shrink_where_there_is_no_room() -> None:

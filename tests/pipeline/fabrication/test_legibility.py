@@ -72,7 +72,7 @@ def test_letters_stand_one_by_one_where_slots_leave_no_room_for_a_word() -> None
     placed = place_id("H12", outline, body, Labels())
     assert placed is not None
     assert placed.kept == pytest.approx(1.0)
-    arrow = orientation_mark(outline, body, placed.box, Labels())
+    arrow = orientation_mark(outline, body, placed, Labels())
     assert read("H12", [*placed.strokes, *arrow]) == pytest.approx(2.0, abs=3e-3)
 
 
