@@ -82,7 +82,7 @@ def _shim_pages(sheet: PdfDocument, specimen: BuiltSpecimen) -> None:
     ]
     heading = ("on plan", "id", "length", "width", "needed", "spare", "to cut")
     total = sum(shim.count for shim in specimen.shims)
-    title = f"shims: {total} pieces of {len(rows)} lengths"
+    title = f"shims: {total} pieces of {len(rows)} length{'s' * (len(rows) != 1)}"
     tones = [TONES[number % len(TONES)] for number in range(len(rows))]
     _table(sheet, title, heading, rows, (16, 32, 24, 24, 18, 18, 18), tones)
 

@@ -182,11 +182,12 @@ def sort_shims(ligaments: Sequence[Ligament], settings: Fabrication) -> tuple[Sh
 def summary(specimen: BuiltSpecimen) -> str:
     """Sums up a specimen in one line."""
     thickened = sum(unit.thickened > 0.0 for unit in specimen.units)
+    lengths = f"{len(specimen.shims)} length{'s' * (len(specimen.shims) != 1)}"
     free = max((ligament.free for ligament in specimen.ligaments), default=0.0)
     strain = 100 * max((ligament.strain for ligament in specimen.ligaments), default=0.0)
     return (
         f"{len(specimen.units)} units ({thickened} thickened beside their slots),"
-        f" {sum(shim.count for shim in specimen.shims)} shims of {len(specimen.shims)} lengths,"
+        f" {sum(shim.count for shim in specimen.shims)} shims of {lengths},"
         f" free up to {free:.2f} mm,"
         f" {len(specimen.bent)} bent before any load, to a strain of {strain:.1f} % at most"
     )

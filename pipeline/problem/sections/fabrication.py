@@ -232,7 +232,8 @@ class Fabrication(Section):
     """Settings of all that is made of a design.
 
     Attributes:
-        material: of the units; its density gives the mass in the bill of materials.
+        material: of the units; its density gives what a print weighs. A unit's mass in the bill of
+            materials is that of the study, `material.density` times its area.
         thickness: height of the units.
         minimum_wall: thinnest wall at a slot's inner end and between two slots.
         minimum_gap: smallest distance of two units.

@@ -154,7 +154,8 @@ def units_out_of_frame(specimen: SpecimenOutlines, calibration: CameraCalibratio
 
 def _name_units(specimen: SpecimenOutlines, foreign: Mask) -> str:
     ids = ", ".join(map(str, specimen.ids[foreign][:8])) + (", ..." if foreign.sum() > 8 else "")
-    return f"{foreign.sum()} units are hidden or not as the design has them ({ids})"
+    are = "1 unit is" if foreign.sum() == 1 else f"{foreign.sum()} units are"
+    return f"{are} hidden or not as the design has them ({ids})"
 
 
 def _pitch(specimen: SpecimenOutlines, found: LatticeDetection) -> float:

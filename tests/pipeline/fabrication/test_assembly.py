@@ -46,7 +46,7 @@ def test_the_pages_name_every_unit_shim_and_fixture(tmp_path: Path) -> None:
     (plan,) = (page for page in pages if "1:1" in page[0])
     assert {"A1", "B1", "C1", "A2", "B2", "C2", "A", "B", "C", "1", "2"} <= set(plan)
     (shims,) = (page for page in pages if "shims" in page[0])
-    assert "shims: 8 pieces of 1 lengths" in shims[0]
+    assert "shims: 8 pieces of 1 length" in shims[0]
     assert {"S8.25", "8.25 mm", "8.10 mm", "7", "1", "8"} <= set(shims)
     assert "Set the clamped units into their pads, grips or adapters: A1, C2." in " ".join(pages[0])
     steps = [words for words in pages[0] if words.rstrip(".").isdigit()]
