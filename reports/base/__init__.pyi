@@ -1,4 +1,5 @@
 from . import style as style
+from .axis_numbers import WIDEST_OF_BAR as WIDEST_OF_BAR
 from .axis_numbers import scale_wide_numbers as scale_wide_numbers
 from .axis_numbers import typeset as typeset
 from .csv_table import Table as Table

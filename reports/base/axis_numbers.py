@@ -9,6 +9,8 @@ from matplotlib.ticker import FixedFormatter
 
 WIDEST = 6.3
 """Width of a number beyond which its power of ten goes into the label of the axis, mm."""
+WIDEST_OF_BAR = 5.5
+"""The same of a bar of colours at the right edge of a figure, mm."""
 _DIGIT, _OTHERS = 1.35, {".": 0.67, "−": 1.77}
 """Widths of the characters of numbers on axes, mm."""
 DECADES = 1e3
@@ -37,25 +39,26 @@ def is_power(value: float) -> bool:
     return f"{value:.0e}".startswith("1e")
 
 
-def scale_wide_numbers(axes: Axes) -> int:
+def scale_wide_numbers(axes: Axes, widest: float = WIDEST) -> int:
     """Takes the power of ten out of wide numbers on both axes, into their labels.
 
-    It is called when the limits are final. A logarithmic axis of many decades has powers of ten.
+    It is called when the limits are final; `widest` is the room for a number, mm. A logarithmic
+    axis of many decades has powers of ten.
 
     Returns:
         The exponent of what was taken out of the y axis.
     """
-    _scale(axes.xaxis)
-    return _scale(axes.yaxis)
+    _scale(axes.xaxis, widest)
+    return _scale(axes.yaxis, widest)
 
 
-def _scale(axis: Axis) -> int:
+def _scale(axis: Axis, widest: float) -> int:
     formatter = axis.get_major_formatter()
     low, high = np.sort(axis.get_view_interval())
     shown = [at for at in axis.get_majorticklocs() if low <= at <= high]
     if isinstance(formatter, FixedFormatter) or not np.any(shown):
         return 0
-    if max(map(_width, formatter.format_ticks(shown))) <= WIDEST and not formatter.get_offset():
+    if max(map(_width, formatter.format_ticks(shown))) <= widest and not formatter.get_offset():
         return 0
     if axis.get_scale() == "log" and high > DECADES * low:
         axis.set_major_formatter(lambda value, _: _power(value) if is_power(value) else "")

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from pipeline.problem import Problem
 from pipeline.problem.sections import Lattice
-from reports.base import scale_wide_numbers, style, typeset
+from reports.base import WIDEST_OF_BAR, scale_wide_numbers, style, typeset
 from reports.figures.loading_path.abscissa import (
     SECOND,
     Abscissa,
@@ -362,4 +362,4 @@ def shade_bar(figure: Figure, shade: UnitColouring, place: tuple[float, float, f
     most = int(np.clip(place[-1] / 3.5, 2, 8))  # numbers of a low bar would overlap
     bar.yaxis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10]))
     bar.yaxis.set_major_formatter(lambda value, _: typeset(f"{value:g}"))
-    scale_wide_numbers(bar)
+    scale_wide_numbers(bar, WIDEST_OF_BAR)

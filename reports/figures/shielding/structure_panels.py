@@ -11,7 +11,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc
 
-from reports.base import scale_wide_numbers, style
+from reports.base import WIDEST_OF_BAR, scale_wide_numbers, style
 from reports.facts import measures
 from reports.figures.shielding.facts import MONITORED
 from reports.panels import (
@@ -151,7 +151,7 @@ def snapshots_panel(
                 axes.set_title(text, fontsize=style.TEXT, pad=1.0)
     place = (left + count * side + 1.5, top, len(rows) * side - gap)
     made = colour_bar(figure, norm, style.MAGNITUDE, place, r"$\|\mathbf{U}\|$", extend="max")
-    scale_wide_numbers(made.ax)
+    scale_wide_numbers(made.ax, WIDEST_OF_BAR)
 
 
 def _colour_limit(scene: ReportScene, rows: Sequence[SnapshotRow]) -> float:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from pipeline.posing import law_comparison
 from pipeline.problem.sections import Method
+from reports.base import style
 from reports.facts import checks
 from reports.facts.copies import in_words
 from reports.figures import kinds
@@ -19,13 +20,15 @@ from reports.figures.loading_path import (
     figure,
     measures,
     monte_carlo,
+    snapshot_grid,
 )
 from reports.figures.loading_path import facts as path_facts
+from reports.figures.loading_path.structure_panels import UnitColouring
 from reports.figures.shielding import facts as shielding
 from reports.figures.study_report import study_report
 from reports.figures.wave.figure import wave_figure
 from reports.page import publish
-from reports.panels import PanelFigure, payload
+from reports.panels import ColourField, PanelFigure, payload
 from reports.study import StudyResults
 from tests.reports import figure_assertions, recorded_study
 from tests.reports.loading_paths import changed, made, values
@@ -250,3 +253,17 @@ def test_evaluations_that_are_not_drawn_are_told(smile: StudyResults) -> None:
     assert "counted from the end of those by the angle law" in found["evaluations_sqp"].note
     each = 7 + asked.optimiser.methods.chosen["sqp"].evaluations
     assert f"up to {each} evaluations each, {3 * each} in all" in found["descents"].note
+
+
+@pytest.mark.parametrize("most", [0.03, 0.3, 3.0, 12.0])
+def test_the_label_of_the_bar_is_not_cut(most: float) -> None:
+    """At the right edge of a figure as wide as a page."""
+    field = ColourField("size", "|U|", "1", 1.0, "magnitude", (0.0, most))
+    shade = UnitColouring(field, r"$\|\mathbf{U}\|$", style.MAGNITUDE)
+    with style.styled():
+        made = style.page(110.0)
+        left = style.TWO_COLUMNS - snapshot_grid.BAR + 1.5
+        snapshot_grid.shade_bar(made, shade, (left, 10.0, 90.0))
+        made.draw_without_rendering()
+        (bar,) = made.axes
+        assert bar.yaxis.label.get_window_extent().x1 < made.bbox.x1
