@@ -15,6 +15,7 @@ from pipeline.runtime import UserError, begins_with, cli, found_in, sidecar_path
 from pipeline.tracking.frames import Recording
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import outlines_of_design
+from pipeline.tracking.output import check_drive_axis
 from pipeline.virtual_lab import (
     assemble_truth,
     encode_video,
@@ -87,6 +88,8 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     if out.suffix not in virtual.codec.suffixes:
         what = f"{virtual.codec.name} does not go into such a file"
         raise UserError(what, file=out, remedy=f"name it *{virtual.codec.suffixes[0]}")
+    if asked.load_axis == "driven displacement":
+        check_drive_axis(datasets.read(design, "design"), path)
     parents = {"response": response, "design": design}
     origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=True)
     with found_in(path):

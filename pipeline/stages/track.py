@@ -55,8 +55,8 @@ from pipeline.tracking.motion import (
 )
 from pipeline.tracking.output import (
     assemble_track,
+    check_drive_axis,
     dic_points,
-    driven_units,
     track_table_path,
     write_track_table,
 )
@@ -241,7 +241,7 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     video, source = _sources(asked, path, args.design)
     design = as_built(datasets.read(source, "design"), asked.structure)
     if asked.load_axis == "driven displacement":
-        _check_driven(design, path)
+        check_drive_axis(design, path)
     parents, log = {"design": source, "video": video}, None
     if asked.load_cell is not None:
         held = parents["load_cell"] = path.parent / asked.load_cell.file
@@ -269,20 +269,6 @@ def _track(path: Path, args: argparse.Namespace) -> None:
         words = ["--track", str(args.out), "--video", str(video), "--out-dir"]
         command = shlex.join([*words, str(args.out.with_name(f"{args.out.stem}_report"))])
         LOG.info("overlay and quality page: python -m %sreports tracking %s", PREFIX, command)
-
-
-def _check_driven(design: xr.Dataset, source: Path) -> None:
-    """Refuses the displacement of the driven units as an axis where it is not that of one drive."""
-    drives = json.loads(design.attrs["problem"]).get("drive", {}).get("drives", [])
-    if not driven_units(design).any():
-        remedy = "write `load_axis: time`, or give the design of a study with driven units"
-        what = "the design has no driven units"
-    elif len(drives) > 1:
-        remedy = "write `load_axis: time`"
-        what = f"{len(drives)} drives act at once: the mean over all their units is that of none"
-    else:
-        return
-    raise UserError(what, file=source, key="load_axis", value="driven displacement", remedy=remedy)
 
 
 def _read_load_log(

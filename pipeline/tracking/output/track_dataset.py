@@ -1,5 +1,6 @@
 """Writes a track as a dataset with the names and shapes of a response, and as a plain table."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.datasets import SYNTHETIC_LABEL
 from pipeline.datasets.tables import TABLES
-from pipeline.runtime import begins_with, sidecar_path, write_atomically
+from pipeline.runtime import UserError, begins_with, sidecar_path, write_atomically
 from pipeline.tracking.motion import Track
 from sim.core import Floats, Ints, Mask, Reals
 
@@ -86,6 +87,24 @@ def driven_units(design: xr.Dataset, leading: Ints | None = None) -> Mask:
     flag = TABLES["design"]["support"].flags["driven"]
     driven = np.asarray(design["support"].values == flag)
     return driven if leading is None else driven & np.isin(design["unit"].values, leading)
+
+
+def check_drive_axis(design: xr.Dataset, source: Path) -> None:
+    """Refuses the displacement of the driven units as an axis where it is not that of one drive.
+
+    Raises:
+        UserError: no unit of the design is driven, or several drives act at once; names `source`.
+    """
+    drives = json.loads(design.attrs["problem"]).get("drive", {}).get("drives", [])
+    if not driven_units(design).any():
+        remedy = "write `load_axis: time`, or give the design of a study with driven units"
+        what = "the design has no driven units"
+    elif len(drives) > 1:
+        remedy = "write `load_axis: time`"
+        what = f"{len(drives)} drives act at once: the mean over all their units is that of none"
+    else:
+        return
+    raise UserError(what, file=source, key="load_axis", value="driven displacement", remedy=remedy)
 
 
 def drive_displacement(

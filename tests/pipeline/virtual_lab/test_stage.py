@@ -1,6 +1,7 @@
 import csv
 import json
 import logging
+import shutil
 from pathlib import Path
 
 import av
@@ -113,6 +114,21 @@ def test_a_drive_that_turns_is_not_weighed(
     words = ["weigh", str(asked), "--response", str(held), "--out", str(tmp_path / "load.csv")]
     told = failing("film", words)
     assert all(part in told for part in (str(asked), "virtual.load_cell", "leave load_cell out"))
+
+
+def test_an_axis_of_several_drives_is_refused_before_a_film(
+    files: Path, tmp_path: Path, failing: Failing
+) -> None:
+    drives = json.dumps({"drive": {"kind": "several", "drives": [{}, {}]}})
+    origin = {"problem": drives, "problem_hash": "", "parents": "{}"}
+    asked, several = recording(tmp_path), shutil.copytree(files, tmp_path / "several")
+    design = datasets.read(files / "design.nc", "design")
+    design["support"][:] = 2  # driven
+    datasets.write(design, several / "design.nc", "design", origin)
+    asked.write_text(f"load_axis: driven displacement\n{asked.read_text()}", encoding="utf-8")
+    told = failing("film", words(several, asked, tmp_path / "clip.mp4"))
+    assert all(part in told for part in (str(asked), "load_axis: time", "2 drives act at once"))
+    assert not (tmp_path / "clip.mp4").exists()
 
 
 def test_a_request_is_not_written_over(files: Path, tmp_path: Path, failing: Failing) -> None:
