@@ -16,7 +16,7 @@ _MARGIN = 1.0
 """A unit nearer to the rim of the picture is not expected to be a patch of its own, radii."""
 _LEAST_MARGIN, _FEWEST = 0.1, 3
 """A placement must be better than those at other places by this part of its matches."""
-_MATCH_RATIO, _MISSING_SHARE, _SAME_SHARE = 1.2, 0.5, 0.2
+_MATCH_RATIO, _MISSING_SHARE, _SAME_SHARE = 1.03, 0.5, 0.2
 _PLACE_DIFFERENCE = 0.5
 """Distance of places that are others, pitches."""
 _DETECTION_PIXELS = 25.0
@@ -67,13 +67,14 @@ class Relocaliser(NamedTuple):
         if not found:
             return []
         best = found[0]
-        moved = np.linalg.norm(best.place - centre - now[:, :2], axis=1)[good]
         matches = len(best.unit)
         if matches <= _MATCH_RATIO * good.sum() or best.missing > _MISSING_SHARE * matches:
             return []
-        if (moved < _PLACE_DIFFERENCE * pitch).sum() > _SAME_SHARE * matches:
-            return []  # what is found is where it was taken to be
         candidates = [best, *(other for other in found[1:] if self._is_ambiguous(best, other))]
+        for one in candidates:
+            moved = np.linalg.norm(one.place - centre - now[:, :2], axis=1)[good]
+            if (moved < _PLACE_DIFFERENCE * pitch).sum() > _SAME_SHARE * matches:
+                return []  # what is found may be where it was taken to be
         candidates.sort(key=lambda one: abs(one.turn))
         return [
             LatticePlace(np.column_stack([one.place - centre, pose[:, 2] + one.turn]), one.turn)

@@ -27,6 +27,9 @@ _VELOCITY_FRAMES = 3
 _JUMP_SHARE, _FOUND_SHARE = 0.9, 0.5
 """Part of the units below which the specimen may have jumped; with as many found in another place,
 it has."""
+_LOST_SHARE = 0.04
+"""Part of the units, lost at once, from which it may have jumped too: by a whole number of pitches,
+after which most units lie where others lay and are taken for these."""
 _NEARLY_ALL = 0.8
 """Part of the units that must be found for their poses to be those looked for after a loss."""
 _UNIT_TURNS = np.deg2rad([0, 15, -15, 30, -30])
@@ -110,9 +113,10 @@ class Tracker:
             self._search.appearance = ReferenceAppearance(fits, templates, noise, self._seen)
             self._search.fitter.full = np.nan_to_num(fits.information)
         good = self._search.complete(image, known, fits, self._search.accepted(fits, known))
-        jumped = good.mean() < _JUMP_SHARE
-        if jumped and not first:
+        still = first or bool(good.mean() < _JUMP_SHARE)
+        if not first and (still or self._loses_many(good)):
             fits, good = self._relocalise(image, fits, good)
+            still |= self._known is not known  # a hand that passes stops no motion
         in_view = self._relocaliser.in_view(self._known.pose)
         if self._out_of_sight and good.sum() <= _FOUND_SHARE * in_view.sum():
             good[:] = False  # a few may be others, a unit aside
@@ -122,13 +126,18 @@ class Tracker:
             self._slopes.apply(fits, good)
         for values in fits:
             values[~good] = np.nan
-        self._update(fits, good, first or jumped)
+        self._update(fits, good, still)
         return TrackedFrame(fits, quality)
 
     @property
     def bend_share(self) -> Reals:
         """Shares (units, 2) of accelerations that the blurred frame shows, as `ExposureBlur`."""
         return self._search.bend_share
+
+    def _loses_many(self, good: Mask) -> bool:
+        """Tests whether many units that the frame before shows are lost at once."""
+        before = np.isfinite(self._history[-1][1][:, 0])
+        return bool((before & ~good).sum() > _LOST_SHARE * len(good))
 
     def _measure_exposure(self, image: Picture, fits: PoseFits) -> None:
         known = self._known
