@@ -164,8 +164,8 @@ def _followed_by(asked: Problem, scene: Scene, evaluation: float) -> str:
 
 def doubts(asked: Problem, scene: Scene) -> Iterator[str]:
     """Lists what may not be meant, besides what `check_scene` warns of."""
-    if len(scene.loads.clamped) == 0:
-        yield "no unit is clamped: what is not driven floats freely; give `supports`"
+    if not scene.is_held:
+        yield "nothing holds the structure: it can move or turn as one; give `supports`"
     size = float(np.ptp(scene.lattice.vertices, axis=0).max())
     for drive in single_drives(asked.drive):
         push = getattr(drive, "amplitude", 0.0) if drive.unit == "mm" else 0.0

@@ -70,7 +70,7 @@ def _show(args: argparse.Namespace) -> None:
         rest_panel(axes, asked, _at_rest(asked, scene), "cloaked")
         _removed(axes, asked, scene)
         axes.set_title(style.literal(asked.title or args.problem.parent.name))
-        _legend(axes, asked)
+        _legend(axes, asked, clamped=len(scene.loads.clamped) > 0)
         path = args.out_dir / "check.png"
         with write_atomically(path) as aside:
             figure.savefig(aside, format="png", dpi=150)
@@ -123,8 +123,11 @@ def _removed(axes: Axes, asked: Problem, scene: Scene) -> None:
     axes.add_collection(made)
 
 
-def _legend(axes: Axes, asked: Problem) -> None:
-    tints = {"redesigned": CLOAK_TINT, "clamped": CLAMP_TINT, "driven": DRIVE_TINT}
+def _legend(axes: Axes, asked: Problem, *, clamped: bool) -> None:
+    tints = {"redesigned": CLOAK_TINT}
+    if clamped:
+        tints |= {"clamped": CLAMP_TINT}
+    tints |= {"driven": DRIVE_TINT}
     if asked.objective.region != "surroundings":
         tints |= {"of interest": INTEREST_TINT}
     told: list[Artist] = [

@@ -256,6 +256,19 @@ class Scene:
         """Returns the initial network."""
         return self.structure.lattice
 
+    @property
+    def is_held(self) -> bool:
+        """Tells whether supports and prescribed motions hold it against moving or turning as one.
+
+        A force holds nothing.
+        """
+        unit, dof = np.divmod(self.loads.held, 3)
+        sites = (self.lattice.site - self.lattice.site.mean(axis=0)) / self.lattice.spacing
+        x, y = sites[unit].T
+        turned = np.select([dof == 0, dof == 1], [-y, x], 1.0)
+        modes = np.stack([dof == 0, dof == 1, turned], axis=1)
+        return bool(np.linalg.matrix_rank(modes) == modes.shape[1])
+
     def updated(self, **changes: Any) -> Scene:  # noqa: ANN401  (fields of the records)
         """Replaces fields of the records, whichever holds them, such as ``accuracy="tight"``.
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 import xarray as xr
+from matplotlib.patches import Patch
 from PIL import Image, ImageDraw
 
 from pipeline.posing import altered_lattice_of, cost_line, doubts, scene_of
@@ -227,6 +228,60 @@ def test_a_push_on_rows_of_hexagons_is_doubted(tmp_path: Path, angle: str, ampli
     told = list(doubts(asked, scene_of(asked, tmp_path)))
     assert len(told) == ((angle, amplitude) == ("180", "1"))
     assert all(line.startswith("rows of hexagons buckle") for line in told)
+
+
+SQUEEZED = """
+drives:
+  - { kind: linear_ramp, units: left, amplitude: 1 mm, direction: 0 deg, duration: 1 s }
+  - { kind: linear_ramp, units: right, amplitude: 1 mm, direction: 180 deg, duration: 1 s }
+horizon: { duration: 1 s, steps: 4 }
+"""
+PUSHED = """
+drive: { kind: force, units: right, amplitude: 1 N, direction: 180 deg, frequency: 1 Hz, FREE }
+horizon: { duration: 1 s, samples: 21 }
+"""
+
+
+def without_supports(folder: Path, loads: str) -> Path:
+    path = static.write(folder, static.HOLE, size=5, amplitude=1.0)
+    text = path.read_text()
+    begin, end = text.index("supports:"), text.index("\nconstraints:")
+    longer = text[end:].replace("response: { samples: 9 }", "response: { samples: 24 }")
+    path.write_text(text[:begin] + loads + longer)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("loads", "floats"),
+    [
+        (SQUEEZED, False),
+        (PUSHED.replace("FREE", "free: [uy]"), True),
+        (PUSHED.replace("FREE", "free: [uy, theta]"), True),
+    ],
+)
+def test_what_nothing_holds_is_doubted(loads: str, floats: bool, tmp_path: Path) -> None:
+    """Two driven sides hold all between them; a force holds nothing."""
+    found = doubted(without_supports(tmp_path, loads))
+    assert any(told.startswith("nothing holds the structure") for told in found) == floats
+    assert floats or found == []
+
+
+@pytest.mark.parametrize("clamped", [True, False])
+def test_the_legend_names_clamped_units_where_there_are_some(
+    clamped: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = static.write(tmp_path, static.HOLE, size=5, amplitude=1.0)
+    path = path if clamped else without_supports(tmp_path, SQUEEZED)
+    names: list[str] = []
+
+    def kept(color: str, label: str) -> Patch:
+        names.append(label)
+        return Patch(color=color, label=label)
+
+    monkeypatch.setattr(check, "Patch", kept)
+    assert main(["check", "--problem", str(path), "--out-dir", str(tmp_path / "out")]) == 0
+    assert ("clamped" in names) == clamped
+    assert "driven" in names
 
 
 def test_a_neck_is_doubted(tmp_path: Path) -> None:
