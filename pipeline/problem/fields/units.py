@@ -70,6 +70,10 @@ Meganewtons are told in stiffnesses and moduli alone.
 """
 _WORD = re.compile(r"(?<![A-Za-z])[MG](?:in|ft|mil|min)(?![A-Za-z])")
 """Words, such as the Min of a column's title, that would be millions of inches or minutes."""
+_COMMA = re.compile(r"\s*[+-]?\d+,\d")
+_MINUS = re.compile(r"\s*(?P<sign>[\u2212\u2013])\s*[\d.]")
+_SIGNS = {"\u2212": "the minus sign is U+2212", "\u2013": "the minus sign is an en dash, U+2013"}
+_PERCENT = re.compile(rf"\s*{_NUMBER}\s*%\s*")
 _RAISED = str.maketrans({"²": "^2", "³": "^3"})
 
 
@@ -121,6 +125,19 @@ def split_quantity(text: str) -> tuple[float, str] | None:
     return None if match is None or match["rest"] else (float(match["number"]), match["unit"] or "")
 
 
+def misspelt_number(text: str) -> tuple[str, str] | None:
+    """Finds what is wrong with how a number is written, and the remedy; None if that is unknown."""
+    if found := _MINUS.match(text):
+        return _SIGNS[found["sign"]], "write -"
+    return ("a decimal comma", "write a decimal point") if _COMMA.match(text) else None
+
+
+def misspelt_share(text: str) -> tuple[str, str] | None:
+    """Finds a number in percent where a plain one is wanted, and that number as the remedy."""
+    found = _PERCENT.fullmatch(text[:_LONGEST])
+    return found and ("a number in percent", f"write {float(found['number']) / 100:.12g}")
+
+
 def parse_quantity(text: object, dimension: Dimension) -> float:
     """Converts the quantity `text` to a float in the working unit of `dimension`.
 
@@ -131,12 +148,12 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
     wanted = f'{dimension.name} is wanted here, e.g. "{dimension.example}"'
     if isinstance(text, bool) or not isinstance(text, str | int | float):
         raise UserError("not a quantity", remedy=wanted)
+    if slip := misspelt_number(str(text)):
+        raise UserError(slip[0], remedy=f"{slip[1]}; {wanted}")
     match = _matched(str(text))
     if match is None:
         raise UserError("not a number with a unit", remedy=wanted)
     if match["rest"] is not None:
-        if re.match(r",\d", match["rest"]):
-            raise UserError("a decimal comma", remedy=f"write a decimal point; {wanted}")
         raise UserError(f"unknown unit {match['rest']!r}", remedy=f"{wanted}; known are {KNOWN}")
     if match["unit"] is None:
         raise UserError("the unit is missing", remedy=wanted)

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from pipeline.problem import SWITCHES, Problem, canonical_json
-from pipeline.problem.fields import FOLDER, Section
+from pipeline.problem.fields import FOLDER, Section, units
 from pipeline.problem.reading import yaml_file
 from pipeline.problem.reading.feasibility import find_faults
 from pipeline.problem.reading.yaml_file import Document, KeyPath
@@ -235,6 +235,10 @@ def _in_words(error: ErrorDetails) -> tuple[str, str, KeyPath]:
         return context["what"], context["remedy"], context["keys"]
     if error["type"] == "missing" and not _is_missing_key(error):
         return "too few items", "write it as [first, second]", ()
+    if error["type"] == "float_parsing":
+        text = str(error["input"])
+        if slip := units.misspelt_number(text) or units.misspelt_share(text):
+            return *slip, ()
     what, remedy = _WORDS.get(error["type"], (error["msg"], "correct the value"))
     return what, remedy.format_map(context), ()
 
