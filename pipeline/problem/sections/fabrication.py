@@ -29,6 +29,18 @@ _THINNEST_LAYER = 1.0  # mm; thinner sheets warp under the laser, and glue adds 
 Clearances = Annotated[tuple[Gap, ...], Field(min_length=1, max_length=20)]
 
 
+def _check_room(name: str, sides: tuple[float, float], margin: float) -> None:
+    """Refuses a sheet or bed on which the margin along its rim leaves no room for parts.
+
+    Raises:
+        PydanticCustomError: naming the sides that would do.
+    """
+    if min(sides) <= 2.0 * margin:
+        what = f"a margin of {margin:g} mm leaves no room on a {name}"
+        remedy = f"give more than {2.0 * margin:g} mm a side, or a smaller `margin`"
+        raise fault(f"{what} of {sides[0]:g} mm by {sides[1]:g} mm", remedy, name)
+
+
 class Slots(Section):
     """Slots at the vertices that hold the shims.
 
@@ -171,6 +183,11 @@ class Laser(Section):
     aspect_ratio: Positive = 3.0
     pin: Length = 1.5
 
+    @model_validator(mode="after")
+    def _has_room(self) -> Self:
+        _check_room("sheet", self.sheet, self.margin)
+        return self
+
 
 class Print(Section):
     """Plates for the printer.
@@ -192,6 +209,11 @@ class Print(Section):
     first_layer_inset: Gap = 0.0
     layer: Length = 0.2
     infill: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+
+    @model_validator(mode="after")
+    def _has_room(self) -> Self:
+        _check_room("bed", self.bed, self.margin)
+        return self
 
 
 class Fixture(Section):
