@@ -11,8 +11,15 @@ STEADY, DUPLICATE, DROPPED = range(3)
 _TICK, _FEWEST = 0.6e-3, 4
 """Seconds by which a stamp is off where milliseconds are counted, about half of one; frames that
 show it."""
+_UNCHANGED, _MOST_CHANGED = 0.005, 0.05
+"""Part of the pixels that change, at most, where nothing is coded anew, and where a codec codes a
+picture again that it shows again."""
+_CHANGE_RATIO = 0.25
+"""The same over what changes in the frames before and after."""
 _LONGEST_RUN = 4
-"""Frames in a row that may repeat one; more show that nothing moves."""
+"""Unchanged frames in a row that may repeat one; more show that nothing moves."""
+_RETURN_RATIO = 0.6
+"""Offset of the frames before and after, over the longer way, where motion turns back."""
 _GAP_RATIO, _GAP_SHARE = 1.7, 0.1
 """An interval so many times the usual is a gap, if no more than this part of all are."""
 _WINDOW = 4
@@ -37,24 +44,25 @@ _IMPROVEMENT = 0.2
 """A gap must make the squared residuals of smooth motion so much smaller."""
 
 
-def timing_faults(time: Floats, motion: Reals, sigma: Reals, same: Mask) -> Ints:
+def timing_faults(time: Floats, motion: Reals, sigma: Reals, changed: Floats) -> Ints:
     """Classifies the timing (frames,) of every frame.
 
-    A frame that repeats the one before is the same in its pixels. A gap stands in the stamps, or
-    else the motion goes on smoothly after it, but only if the frames from there on are later than
-    they say. Where the specimen is at rest or jolts, the stamps alone tell, unless most are alike.
+    A frame that repeats the one before changes far fewer pixels than the frames before and after,
+    in which the specimen moves. A gap stands in the stamps, or else the motion goes on smoothly
+    after it, but only if the frames from there on are later than they say. Where the specimen is at
+    rest or jolts, the stamps alone tell, unless most are alike.
 
     Args:
         time: (frames,) s, as the file says.
         motion: (frames, units, 3) poses, NaN where missing.
         sigma: (frames, units, 3) standard uncertainties.
-        same: (frames,) whether the picture is that of the frame before.
+        changed: (frames,) part of the pixels that differ from those of the frame before.
     """
     place = motion[..., :2].astype(float)
     noise = np.array(
         [np.nanmedian(told) if np.isfinite(told).any() else np.inf for told in sigma[..., :2]]
     )
-    repeated = _duplicates(same)
+    repeated = _duplicates(changed, place, noise)
     out = np.where(repeated, DUPLICATE, STEADY)
     if len(time) > 1 and np.median(np.diff(time)) > 0:
         steps = np.diff(time, prepend=2 * time[0] - time[1]) / np.median(np.diff(time))
@@ -81,14 +89,44 @@ def unrounded(time: Floats) -> Floats:
     return even - even[0] if np.abs(even - time).max() < _TICK else time
 
 
-def _duplicates(same: Mask) -> Mask:
-    """Marks pictures that are shown again, but for long runs of one: there nothing moves."""
-    run = np.split(np.arange(len(same)), np.flatnonzero(np.diff(same)) + 1)
-    out = same.copy()
-    for frames in run:
-        if len(frames) > _LONGEST_RUN:
-            out[frames] = False
+def _duplicates(changed: Floats, place: Floats, noise: Floats) -> Mask:
+    """Marks pictures (frames,) that are shown again, but for long runs of one."""
+    out = np.zeros(len(changed), dtype=bool)
+    still = changed < _UNCHANGED
+    still[:1] = True  # nothing comes before the first
+    starts = np.flatnonzero(~(still[1:] & still[:-1])) + 1
+    runs = np.split(np.arange(len(changed)), starts)
+    for before, run, after in zip(runs, runs[1:], runs[2:], strict=False):
+        beside = min(changed[before[-1]], changed[after[0]]) if before[0] else 0.0
+        most = float(changed[run].max())
+        out[run] = (
+            len(run) <= _LONGEST_RUN
+            and most < min(_MOST_CHANGED, _CHANGE_RATIO * beside)
+            and _goes_on(place[[run[0] - 2, run[0] - 1, after[0]]], noise[run[0]], most == 0)
+        )
     return out
+
+
+def _goes_on(place: Floats, noise: float, same: bool) -> bool:
+    """Tests whether units move before and after a run of frames, and do not turn back in it.
+
+    At a turning point two pictures are nearly the same; where they are the same in all pixels, one
+    is shown again.
+
+    Args:
+        place: (3, units, 2) in the frame before the one that is repeated, in that one, and after.
+        noise: standard uncertainty of a place.
+        same: whether all pixels are the same.
+    """
+    near = place[:, np.isfinite(place).all(axis=(0, 2))]
+    if not near.size:
+        return False
+    before, after, across = (
+        float(np.sqrt(np.mean((near[end] - near[start]) ** 2)))
+        for start, end in ((0, 1), (1, 2), (0, 2))
+    )
+    moves = min(before, after) > _LEAST_STEP * noise
+    return moves and (same or across > _RETURN_RATIO * max(before, after))
 
 
 def _delayed(clock: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:

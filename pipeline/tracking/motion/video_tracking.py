@@ -55,9 +55,9 @@ LOG = logging.getLogger(__name__)
 
 _DEFAULT_SETUP = RecordingSetup()
 _End = TruncatedVideoError | KeyboardInterrupt
-_Row = tuple[float, int, Singles, Singles, NDArray[np.int8], bool, float, Reals]
-"""Time, number, poses, sigma, quality, whether it is a duplicate, inflation of the variance by
-correlated residuals, shares of accelerations that show: what is kept of a frame."""
+_Row = tuple[float, int, Singles, Singles, NDArray[np.int8], float, float, Reals]
+"""Time, number, poses, sigma, quality, part of the pixels that changed, inflation of the variance
+by correlated residuals, shares of accelerations that show: what is kept of a frame."""
 _SHARE_OF_DOF = [0, 0, 1]
 """Place in these shares of that of a shift, or of a rotation."""
 _CODEC_INFLATION = 1.8
@@ -71,8 +71,6 @@ _FINE_PITCH = 60.0
 """Pixels from unit to unit from which on such limits are parts of the pitch: what a motion leaves
 open is a length, and a camera of twice as many pixels must not lose what one of half as many
 keeps."""
-_CHANGED_SHARE = 0.005
-"""Part of the pixels that differ in a picture that is shown again, at most."""
 
 
 class Track(NamedTuple):
@@ -124,7 +122,7 @@ def track_video(
     places = _measure_rest(shown.image, specimen, ways[0], calibration, setup.kind)
     tracker = _make_tracker(shown, specimen, calibration, setup)
     rows, ended = _track_frames(shown.frames, tracker, tell)
-    times, numbers, motion, sigmas, qualities, same, inflation, shares = (
+    times, numbers, motion, sigmas, qualities, changed, inflation, shares = (
         np.array(values) for values in zip(*rows, strict=True)
     )
     exposure = setup.exposure or _refine_exposure(tracker, motion, times)
@@ -147,7 +145,7 @@ def track_video(
     _add_variances(added_variance, motion, places, specimen, calibration, limit)
     remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     qualities[np.isnan(motion[..., 0]) & (qualities == GOOD)] = HIDDEN  # as the supports are
-    faults = timing_faults(time, motion, sigmas, same)
+    faults = timing_faults(time, motion, sigmas, changed)
     steady = faults != DUPLICATE
     later = inflation[1:][np.isfinite(inflation[1:])]
     coded = not len(later) or float(np.median(later)) > _CODEC_INFLATION
@@ -276,9 +274,9 @@ def _track_frames(
             fits, quality = tracker.step(frame.image, frame.time)
             sigma = uncertainty.standard_errors(fits.scatter, fits.blocks).astype(np.float32)
             pose = fits.pose.astype(np.float32)
-            same = before is not None and _is_duplicate(before, frame.image)
+            changed = 0.0 if before is None else _changed_share(before, frame.image)
             before, like = frame.image, uncertainty.variance_inflation(fits)
-            kept = pose, sigma, quality.astype(np.int8), same, like, tracker.bend_share
+            kept = pose, sigma, quality.astype(np.int8), changed, like, tracker.bend_share
             rows.append((frame.time, frame.index, *kept))
             if tell is not None:
                 tell()
@@ -300,12 +298,9 @@ def can_interpolate(time: Floats) -> bool:
     return ascends
 
 
-def _is_duplicate(before: Picture, image: Picture) -> bool:
-    """Detects a picture that is shown again: a codec changes a few pixels by a level."""
-    return (
-        cv2.countNonZero((cv2.absdiff(before, image) > 1).view(np.uint8))
-        < _CHANGED_SHARE * image.size
-    )
+def _changed_share(before: Picture, image: Picture) -> float:
+    """Computes the part of the pixels that differ by more than the level by which codecs err."""
+    return cv2.countNonZero((cv2.absdiff(before, image) > 1).view(np.uint8)) / image.size
 
 
 def _make_tracker(

@@ -22,11 +22,16 @@ def motion(clock: np.ndarray, seed: int = 0) -> np.ndarray:
     return made + NOISE * random.normal(size=made.shape)
 
 
-def faults(moved: Floats, time: Floats | None = None, same: tuple[int, ...] = ()) -> dict[int, int]:
-    """Finds faults of motions whose frames the file takes to be even, some shown again."""
+def faults(
+    moved: Floats, time: Floats | None = None, same: tuple[int, ...] = (), coded: float = 0.0
+) -> dict[int, int]:
+    """Finds faults of motions whose frames the file takes to be even, some shown again.
+
+    A fifth of the pixels change from frame to frame, and some where a codec codes a picture again.
+    """
     time = np.arange(len(moved)) / 30 if time is None else time
-    again = np.isin(np.arange(len(moved)), same)
-    told = frame_timing.timing_faults(time, moved, np.full(moved.shape, NOISE), again)
+    changed = np.where(np.isin(np.arange(len(moved)), same), coded, 0.2)
+    told = frame_timing.timing_faults(time, moved, np.full(moved.shape, NOISE), changed)
     return {int(frame): int(told[frame]) for frame in np.flatnonzero(told)}
 
 
@@ -54,24 +59,52 @@ def test_a_varying_rate_is_no_row_of_gaps_nor_of_rounded_stamps() -> None:
     assert has_uneven_intervals(np.delete(steady, [7, 30]))
 
 
-def test_a_picture_is_the_same_but_for_a_codec() -> None:
-    """Up to half a percent of the pixels may differ by more than a level."""
+def test_pixels_that_change_by_more_than_a_level_are_counted() -> None:
     before = np.full((100, 100), 90, dtype=np.uint8)
-    for differing, by, same in ((10_000, 1, True), (49, 2, True), (50, 2, False)):
+    for differing, by, share in ((10_000, 1, 0.0), (49, 2, 0.0049)):
         image = before.copy()
         image.flat[:differing] += by
-        assert video_tracking._is_duplicate(before, image) == same
+        assert video_tracking._changed_share(before, image) == share
 
 
-def test_frames_shown_again_are_found() -> None:
+def shown_again(frame: int) -> Floats:
+    """Returns a motion in which a frame shows the instant before again."""
     clock = np.arange(FRAMES, dtype=float)
-    clock[25:] -= 1
+    clock[frame:] -= 1
     moved = motion(clock)
-    moved[25] = moved[24]
-    assert faults(moved, same=(25,)) == {25: frame_timing.DUPLICATE}
+    moved[frame] = moved[frame - 1]
+    return moved
+
+
+@pytest.mark.parametrize("coded", [0.0, 0.004, 0.018, 0.045])
+def test_frames_shown_again_are_found(coded: float) -> None:
+    """Of whatever quality the video is coded in."""
+    assert faults(shown_again(25), same=(25,), coded=coded) == {25: frame_timing.DUPLICATE}
     held = np.arange(FRAMES) - np.clip(np.arange(FRAMES) - 24, 0, 4)  # four in a row
     again = tuple(range(25, 29))
-    assert faults(motion(held), same=again) == dict.fromkeys(again, frame_timing.DUPLICATE)
+    found = dict.fromkeys(again, frame_timing.DUPLICATE)
+    if coded < 0.005:
+        assert faults(motion(held), same=again, coded=coded) == found
+
+
+def test_a_video_that_starts_slowly_shows_no_frame_again() -> None:
+    moved = motion(1e-3 * np.arange(FRAMES) ** 2)
+    noise = np.full(moved.shape, NOISE)
+    changed = np.linspace(0, 1, FRAMES) ** 2
+    assert not frame_timing.timing_faults(np.arange(FRAMES) / 30, moved, noise, changed).any()
+
+
+def test_a_specimen_at_rest_shows_no_frame_again() -> None:
+    """Though a codec codes some of its pictures anew and leaves others."""
+    moved = motion(np.zeros(FRAMES))
+    assert faults(moved, same=tuple(set(range(FRAMES)) - {*range(0, FRAMES, 4)})) == {}
+
+
+def test_a_turning_point_is_no_frame_shown_again() -> None:
+    """Though two frames with it midway are nearly the same."""
+    moved = np.zeros((FRAMES, len(CENTRE), 3))
+    moved[..., 0] = 2 * np.cos(2 * np.pi * (np.arange(FRAMES)[:, None] - 24.6) / 20)
+    assert faults(moved, same=(25,), coded=0.01) == {}
 
 
 @pytest.mark.parametrize("step", [0.05, 0.5, 5.0])
