@@ -50,7 +50,8 @@ SVG = (
 POINTS = "points: dic.csv\norigin: [0 mm, 0 mm]\nrotation: 0 deg\ncolumns: {time: t, x: x}\n"
 MANIFEST_TEXT = (
     '{"units": ["A1"], "letters_for_ids": true, "shims": {}, "laser_route": "cut", "prebend": {},'
-    ' "free_dofs": {}, "stiffness_factors": {}, "as_built": {}, "thin_walls_mm": {}, "files": {}}'
+    ' "drives": [], "free_dofs": {}, "stiffness_factors": {}, "as_built": {}, "thin_walls_mm": {},'
+    ' "files": {}}'
 )
 HOLE = "void: { disc: { radius: 7 mm } }"
 PICTURED = "void: { image: { file: {name}, width: 16 mm } }"
