@@ -71,7 +71,7 @@ def timing_faults(time: Floats, motion: Reals, sigma: Reals, changed: Floats) ->
             out[gap] = DROPPED
         if not has_uneven_intervals(np.cumsum(np.where(gap, 1.0, steps))):
             steps = np.round(steps)
-        steps[repeated] = 0.0
+        steps[repeated & ~_replacing(steps, place, noise, repeated)] = 0.0
         out[_delayed(np.cumsum(steps), place, noise, repeated)] = DROPPED
     return out
 
@@ -129,14 +129,41 @@ def _goes_on(place: Floats, noise: float, same: bool) -> bool:
     return moves and (same or across > _RETURN_RATIO * max(before, after))
 
 
+def _replacing(steps: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
+    """Marks repeated frames (frames,) in place of ones that are lost: the next come when they say.
+
+    Others are put between frames, so that the next come later.
+    """
+    out = np.zeros(len(place), dtype=bool)
+    shown = np.flatnonzero(~repeated)
+    inserted = np.cumsum(np.where(repeated, 0.0, steps))
+    for middle in range(_WINDOW, len(shown) - _WINDOW + 1):
+        run = np.arange(shown[middle - 1] + 1, shown[middle])
+        window = shown[middle - _WINDOW : middle + _WINDOW]
+        near = _seen_throughout(place[window])
+        if len(run) and near.size:
+            after = np.arange(len(window)) >= _WINDOW
+            late = float(steps[run].sum())
+            rough, smooth = (
+                _roughness(inserted[window] + more * after, near) for more in (0.0, late)
+            )
+            out[run] = smooth < _IMPROVEMENT * rough and np.sqrt(rough) > _ROUGH * noise[run[0]]
+    return out
+
+
+def _seen_throughout(place: Floats) -> Floats:
+    """Returns coordinates (frames, n) of units that are seen in all frames."""
+    flat = place.reshape(len(place), -1)
+    return flat[:, np.isfinite(flat).all(axis=0)]
+
+
 def _delayed(clock: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
     """Finds frames that come later than their clock (frames,) says, in usual intervals."""
     out = np.zeros(len(place), dtype=bool)
     shown = np.nonzero(~repeated)[0]
     for middle in range(_WINDOW, len(shown) - _WINDOW + 1):
         window = shown[middle - _WINDOW : middle + _WINDOW]
-        near = place[window].reshape(len(window), -1)
-        near = near[:, np.isfinite(near).all(axis=0)]
+        near = _seen_throughout(place[window])
         after = np.arange(len(window)) >= _WINDOW
         rough = (
             [_roughness(clock[window] + gap * after, near) for gap in _GAPS] if near.size else []

@@ -87,6 +87,13 @@ def test_frames_shown_again_are_found(coded: float) -> None:
         assert faults(motion(held), same=again, coded=coded) == found
 
 
+@pytest.mark.parametrize("frame", [12, 25, 40])
+def test_a_frame_shown_in_place_of_a_lost_one_is_no_gap(frame: int) -> None:
+    moved = motion(np.arange(FRAMES, dtype=float))
+    moved[frame] = moved[frame - 1]
+    assert faults(moved, same=(frame,), coded=0.01) == {frame: frame_timing.DUPLICATE}
+
+
 def test_a_video_that_starts_slowly_shows_no_frame_again() -> None:
     moved = motion(1e-3 * np.arange(FRAMES) ** 2)
     noise = np.full(moved.shape, NOISE)
